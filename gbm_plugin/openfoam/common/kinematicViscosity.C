@@ -1,0 +1,20 @@
+#include "kinematicViscosity.H"
+#include "IOdictionary.H"
+#include "dimensionedScalar.H"
+
+Foam::scalar Foam::kinematicViscosity(const objectRegistry& mesh)
+{
+    const dictionary& transport =
+        mesh.lookupObject<IOdictionary>("transportProperties");
+
+    const dimensionedScalar nu("nu", dimViscosity, transport);
+
+    if (nu.value() <= 0)
+    {
+        FatalIOErrorInFunction(transport)
+            << "nu = " << nu.value() << " must be positive"
+            << exit(FatalIOError);
+    }
+
+    return nu.value();
+}

@@ -1,0 +1,112 @@
+#include "connection.H"
+#include "allowedEntries.H"
+#include "socketConnection.H"
+#include "fileConnection.H"
+#include "OSspecific.H"
+
+Foam::autoPtr<Foam::connection> Foam::connection::New
+(
+    const dictionary& coupling,
+    const fileName& caseFolder
+)
+{
+    allowedEntries(coupling, {"transport", "timeout", "host", "port"});
+
+    const word transport =
+        coupling.lookupOrDefault<word>("transport", "socket");
+
+    if (transport == "socket" || transport == "tcp")
+    {
+        return autoPtr<connection>
+        (
+            new socketConnection(coupling, caseFolder, transport == "tcp")
+        );
+    }
+    if (transport == "file")
+    {
+        return autoPtr<connection>(new fileConnection(coupling, caseFolder));
+    }
+
+    FatalIOErrorInFunction(coupling)
+        << "transport '" << transport
+        << "' is unknown; allowed: socket tcp file" << exit(FatalIOError);
+
+    return nullptr;
+}
+
+
+Foam::connection::connection
+(
+    const dictionary& coupling,
+    const fileName& caseFolder
+)
+:
+    case_(caseFolder),
+    timeout_(coupling.lookupOrDefault<scalar>("timeout", 120)),
+    step_(-1)
+{
+    if (timeout_ <= 0)
+    {
+        FatalIOErrorInFunction(coupling)
+            << "timeout = " << timeout_ << " must be positive [s]"
+            << exit(FatalIOError);
+    }
+}
+
+
+Foam::connection::clock::time_point Foam::connection::deadline() const
+{
+    return clock::now() + std::chrono::microseconds(std::int64_t(timeout_*1e6));
+}
+
+
+void Foam::connection::fail(const string& what) const
+{
+    FatalErrorInFunction
+        << "fiber coupling, step " << label(step_) << ": "
+        << what.c_str() << " (daemon on " << peer_.c_str() << ", its log: "
+        << (case_/"log.gbmDaemon").c_str() << ")" << exit(FatalError);
+
+    ::abort();
+}
+
+
+void Foam::connection::send(const message& m)
+{
+    step_ = m.head.step;
+    write(m);
+}
+
+
+Foam::message Foam::connection::receive
+(
+    message::type expected,
+    std::int64_t step
+)
+{
+    message m;
+    read(m);
+
+    if (m.head.type == message::ERROR)
+    {
+        fail("the daemon stopped: " + m.text());
+    }
+    if (m.head.type != expected)
+    {
+        fail
+        (
+            "expected " + message(expected, step, 0).name() + ", received "
+          + m.name()
+        );
+    }
+    if (expected != message::WELCOME && m.head.step != step)
+    {
+        fail
+        (
+            m.name() + " is of step " + std::to_string(m.head.step)
+          + ", expected step " + std::to_string(step)
+        );
+    }
+
+    return m;
+}

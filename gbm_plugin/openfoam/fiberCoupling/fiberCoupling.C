@@ -1,0 +1,430 @@
+#include "fiberCoupling.H"
+#include "allowedEntries.H"
+#include "kinematicViscosity.H"
+#include "addToRunTimeSelectionTable.H"
+#include "fvc.H"
+
+namespace Foam
+{
+namespace functionObjects
+{
+    defineTypeNameAndDebug(fiberCoupling, 0);
+    addToRunTimeSelectionTable(functionObject, fiberCoupling, dictionary);
+}
+}
+
+namespace
+{
+
+//- Seconds since the last call
+class stopwatch
+{
+    using clock = std::chrono::steady_clock;
+    clock::time_point last_ = clock::now();
+
+public:
+
+    Foam::scalar lap()
+    {
+        const auto now = clock::now();
+        const std::chrono::duration<double> d(now - last_);
+        last_ = now;
+        return d.count();
+    }
+};
+
+Foam::scalar timeOfDay()
+{
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return std::chrono::duration<double>(now).count();
+}
+
+}
+
+
+// * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
+
+Foam::functionObjects::fiberCoupling::fiberCoupling
+(
+    const word& name,
+    const Time& time,
+    const dictionary& dict
+)
+:
+    fvMeshFunctionObject(name, time, dict),
+    writeFile(mesh_, name, "coupling"),
+    deltaT_(time.deltaTValue()),
+    step_(time.timeIndex()),
+    beads_(0),
+    ambient_(NOTHING)
+{
+    read(dict);
+
+    if (postProcess)
+    {
+        Info<< type() << " " << name
+            << ": nothing to do in post-processing" << endl;
+        return;
+    }
+
+    const IOdictionary fiberProperties
+    (
+        IOobject
+        (
+            "fiberProperties",
+            time.constant(),
+            mesh_,
+            IOobject::MUST_READ,
+            IOobject::NO_WRITE,
+            false
+        )
+    );
+
+    box_.reset(new periodicBox(mesh_));
+    sampler_ = sampler::New(fiberProperties, mesh_, box_());
+
+    if (Pstream::master())
+    {
+        resetFile("coupling");
+        writeHeader(file(), "Fiber coupling: seconds per step");
+        writeCommented(file(), "Time");
+        for
+        (
+            const char* column :
+            {
+                "wait", "derivative", "interpolation", "sending",
+                "arrivedAt", "sentAt"
+            }
+        )
+        {
+            writeTabbed(file(), column);
+        }
+        file() << endl;
+    }
+
+    shakeHands(fiberProperties);
+
+    // The fibers start, or continue, from the flow at this time. Function
+    // objects are not executed before the first step.
+    exchange();
+}
+
+
+// * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
+
+void Foam::functionObjects::fiberCoupling::shakeHands
+(
+    const IOdictionary& fiberProperties
+)
+{
+    const double cells = returnReduce(double(mesh_.nCells()), sumOp<double>());
+
+    if (Pstream::master())
+    {
+        daemon_ = connection::New
+        (
+            fiberProperties.subOrEmptyDict("coupling"),
+            time_.globalPath()
+        );
+
+        message hello(message::HELLO, step_, time_.value());
+        hello.append<double>(kinematicViscosity(mesh_));
+        hello.append<double>(deltaT_);
+        hello.append(box_->min().cdata(), 3);
+        hello.append(box_->max().cdata(), 3);
+        hello.append(cells);
+        hello.append(daemon_->token());
+        daemon_->send(hello);
+
+        const message welcome(daemon_->receive(message::WELCOME, step_));
+        std::size_t offset = 0;
+        std::int64_t n;
+        welcome.extract(offset, &ambient_, 1);
+        welcome.extract(offset, &n, 1);
+        families_.setSize(n);
+        for (fiberFamily& f : families_)
+        {
+            std::int64_t size[2];
+            welcome.extract(offset, size, 2);
+            f.count = size[0];
+            f.beads = size[1];
+            beads_ += f.count*f.beads;
+        }
+
+        Info<< type() << ": " << families_.size() << " families with "
+            << beads_ << " beads, daemon on " << daemon_->peer().c_str()
+            << endl;
+    }
+
+    Pstream::scatter(beads_);
+    label wanted = ambient_;
+    Pstream::scatter(wanted);
+    ambient_ = wanted;
+
+    labelList sizes(2*families_.size());
+    forAll(families_, i)
+    {
+        sizes[2*i] = families_[i].count;
+        sizes[2*i + 1] = families_[i].beads;
+    }
+    Pstream::scatter(sizes);
+    families_.setSize(sizes.size()/2);
+    forAll(families_, i)
+    {
+        families_[i] = {sizes[2*i], sizes[2*i + 1]};
+    }
+}
+
+
+bool Foam::functionObjects::fiberCoupling::receivePositions
+(
+    List<point>& positions,
+    times& t
+)
+{
+    bool provisional = false;
+    stopwatch watch;
+
+    if (Pstream::master())
+    {
+        const message m(daemon_->receive(message::POSITIONS, step_));
+        provisional = m.head.flags & message::provisional;
+
+        std::size_t offset = 0;
+        positions.setSize(beads_);
+        m.extract(offset, positions.begin(), beads_);
+    }
+
+    Pstream::scatter(provisional);
+    Pstream::scatter(positions);
+    t.wait += watch.lap();
+
+    return provisional;
+}
+
+
+template<class Type>
+void Foam::functionObjects::fiberCoupling::collect
+(
+    const Field<Type>& mine,
+    message& m
+) const
+{
+    List<labelList> indices(Pstream::nProcs());
+    List<Field<Type>> values(Pstream::nProcs());
+    indices[Pstream::myProcNo()] = sampler_->indices();
+    values[Pstream::myProcNo()] = mine;
+    Pstream::gatherList(indices);
+    Pstream::gatherList(values);
+
+    if (!Pstream::master())
+    {
+        return;
+    }
+
+    Field<Type> all(beads_);
+    label found = 0;
+    forAll(indices, rank)
+    {
+        UIndirectList<Type>(all, indices[rank]) = values[rank];
+        found += indices[rank].size();
+    }
+    if (found != beads_)
+    {
+        FatalErrorInFunction
+            << found << " of " << beads_ << " beads were found in the mesh"
+            << exit(FatalError);
+    }
+    forAll(all, i)
+    {
+        if (!std::isfinite(magSqr(all[i])))
+        {
+            FatalErrorInFunction
+                << "the flow at bead " << i << " is not finite at step "
+                << step_ << ", time " << time_.value() << exit(FatalError);
+        }
+    }
+
+    m.append(all.cdata(), all.size());
+}
+
+
+void Foam::functionObjects::fiberCoupling::sendSample
+(
+    bool provisional,
+    times& t
+)
+{
+    const volVectorField& U = mesh_.lookupObject<volVectorField>(UName_);
+    stopwatch watch;
+
+    tmp<volVectorField> rotation;
+    tmp<volTensorField> gradient;
+    if (ambient_ == ROTATION)
+    {
+        rotation = 0.5*fvc::curl(U);
+    }
+    else if (ambient_ == GRADIENT)
+    {
+        // OpenFOAM's gradient is the transpose of du_i/dx_j
+        gradient = fvc::grad(U)().T();
+    }
+    t.derivative += watch.lap();
+
+    message sample(message::SAMPLE, step_, time_.value());
+
+    collect(sampler_->sample(U), sample);
+    if (rotation.valid())
+    {
+        collect(sampler_->sample(rotation()), sample);
+    }
+    if (gradient.valid())
+    {
+        collect(sampler_->sample(gradient()), sample);
+    }
+    t.interpolation += watch.lap();
+
+    if (Pstream::master())
+    {
+        // with the case's own fields of this time, which are on disk already
+        if (time_.writeTime() && !provisional)
+        {
+            message save(message::SAVE, step_, time_.value());
+            save.append
+            (
+                (Pstream::parRun() ? "processor0/" : "") + time_.timeName()
+            );
+            daemon_->send(save);
+        }
+        daemon_->send(sample);
+    }
+    t.sending += watch.lap();
+}
+
+
+void Foam::functionObjects::fiberCoupling::exchange()
+{
+    times t{0, 0, 0, 0};
+    scalar arrived = 0;
+    bool provisional = true;
+
+    while (provisional)
+    {
+        List<point> positions;
+        provisional = receivePositions(positions, t);
+        arrived = timeOfDay();
+
+        stopwatch watch;
+        sampler_->locate(positions);
+        t.interpolation += watch.lap();
+
+        sendSample(provisional, t);
+    }
+
+    writeTimes(t, arrived, timeOfDay());
+
+    if (writeCloud_ && time_.writeTime())
+    {
+        writeFiberCloud(mesh_, sampler_(), families_);
+    }
+}
+
+
+void Foam::functionObjects::fiberCoupling::writeTimes
+(
+    const times& t,
+    scalar arrived,
+    scalar left
+)
+{
+    if (Pstream::master())
+    {
+        writeCurrentTime(file());
+        file()
+            << token::TAB << t.wait << token::TAB << t.derivative
+            << token::TAB << t.interpolation << token::TAB << t.sending
+            << setprecision(17)
+            << token::TAB << arrived << token::TAB << left
+            << setprecision(writePrecision_) << endl;
+    }
+}
+
+
+// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
+
+bool Foam::functionObjects::fiberCoupling::read(const dictionary& dict)
+{
+    fvMeshFunctionObject::read(dict);
+    writeFile::read(dict);
+
+    // beside ours, what function objects in general have
+    allowedEntries
+    (
+        dict,
+        {
+            "type", "libs", "functionObjectLibs", "enabled", "log", "region",
+            "errors", "timeStart", "timeEnd", "writePrecision", "writeToFile",
+            "useUserTime", "U", "writeCloud"
+        }
+    );
+
+    UName_ = dict.lookupOrDefault<word>("U", "U");
+    writeCloud_ = dict.lookupOrDefault("writeCloud", true);
+
+    if (time_.controlDict().lookupOrDefault("adjustTimeStep", false))
+    {
+        FatalIOErrorInFunction(time_.controlDict())
+            << "adjustTimeStep yes: fibers move with a fixed time step, as"
+            << " they are sent ahead of the flow. Set adjustTimeStep no and"
+            << " deltaT to the smallest step that the flow needs"
+            << exit(FatalIOError);
+    }
+
+    return true;
+}
+
+
+bool Foam::functionObjects::fiberCoupling::execute()
+{
+    if (postProcess || time_.timeIndex() == step_)
+    {
+        return true;    // executed again at the end of the run
+    }
+
+    if (mag(time_.deltaTValue() - deltaT_) > 1e-9*deltaT_)
+    {
+        FatalErrorInFunction
+            << "deltaT changed from " << deltaT_ << " to "
+            << time_.deltaTValue() << " during the run: fibers move with a"
+            << " fixed time step, which may change at a restart"
+            << exit(FatalError);
+    }
+    if (time_.timeIndex() != step_ + 1)
+    {
+        FatalErrorInFunction
+            << "step " << time_.timeIndex() << " follows step " << step_
+            << ": the coupling must be executed in every step"
+            << exit(FatalError);
+    }
+
+    ++step_;
+    exchange();
+
+    return true;
+}
+
+
+bool Foam::functionObjects::fiberCoupling::end()
+{
+    if (daemon_.valid())
+    {
+        daemon_->send(message(message::END, step_, time_.value()));
+
+        // the daemon is one step ahead: its last positions are not needed
+        daemon_->receive(message::POSITIONS, step_ + 1);
+        daemon_->receive(message::GOODBYE, step_);
+        daemon_.clear();
+    }
+
+    return true;
+}
