@@ -112,6 +112,12 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
 
 // * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
 
+std::string Foam::functionObjects::fiberCoupling::timeFolder() const
+{
+    return (Pstream::parRun() ? "processor0/" : "") + time_.timeName();
+}
+
+
 void Foam::functionObjects::fiberCoupling::shakeHands
 (
     const IOdictionary& fiberProperties
@@ -133,6 +139,9 @@ void Foam::functionObjects::fiberCoupling::shakeHands
         hello.append(box_->min().cdata(), 3);
         hello.append(box_->max().cdata(), 3);
         hello.append(cells);
+        const std::string folder(timeFolder());
+        hello.append<std::int64_t>(folder.size());
+        hello.append(folder);
         hello.append(daemon_->token());
         daemon_->send(hello);
 
@@ -183,12 +192,14 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
 )
 {
     bool provisional = false;
+    bool stop = false;
     stopwatch watch;
 
     if (Pstream::master())
     {
         const message m(daemon_->receive(message::POSITIONS, step_));
         provisional = m.head.flags & message::provisional;
+        stop = m.head.flags & message::stop;
 
         std::size_t offset = 0;
         positions.setSize(beads_);
@@ -196,7 +207,16 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
     }
 
     Pstream::scatter(provisional);
+    Pstream::scatter(stop);
     Pstream::scatter(positions);
+
+    if (stop)
+    {
+        Info<< type() << ": the daemon was asked to end the run:"
+            << " writing and stopping after the next step" << endl;
+        time_.stopAt(Time::stopAtControls::saWriteNow);
+    }
+
     t.wait += watch.lap();
 
     return provisional;
@@ -290,10 +310,7 @@ void Foam::functionObjects::fiberCoupling::sendSample
         if (time_.writeTime() && !provisional)
         {
             message save(message::SAVE, step_, time_.value());
-            save.append
-            (
-                (Pstream::parRun() ? "processor0/" : "") + time_.timeName()
-            );
+            save.append(timeFolder());
             daemon_->send(save);
         }
         daemon_->send(sample);

@@ -1,0 +1,94 @@
+"""The initial velocity of a case: `system/initialFieldDict` read, evaluated, and written as <time>/U."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from .dictionary import CaseError, Dictionary
+from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
+
+KINDS = ("random", "modes", "taylorGreen", "ABC")
+
+
+def read_initial_field(case: Path) -> FourierModes:
+    """The modes that `system/initialFieldDict` describes. CaseError where an entry is wrong."""
+    d = Dictionary.read(case, "system/initialFieldDict")
+    kind = d.word("field", KINDS)
+    try:
+        if kind == "random":
+            modes = _random(d)
+        elif kind == "taylorGreen":
+            modes = taylor_green(d.number("velocity", 1.0))
+        elif kind == "ABC":
+            modes = abc(d.number("A", 1.0), d.number("B", 1.0), d.number("C", 1.0))
+        else:
+            modes = _modes(d)
+    except CaseError:
+        raise
+    except ValueError as error:
+        raise CaseError(f"{d.where}: {error}") from None
+    d.done()
+    return modes
+
+
+def _random(d: Dictionary) -> FourierModes:
+    shape = d.word("spectrum", ("peaked", "table"), "peaked")
+    seed = d.integer("seed", 1, least=0)
+    if shape == "table":
+        table = d.raw("table")
+        try:
+            spectrum = {int(k): float(e) for k, e in table}
+        except (TypeError, ValueError):
+            raise d.fail("table", "must be a list of (shell energy), as ((1 0.1) (2 0.2))") from None
+        return random_modes(spectrum, seed)
+    energy = d.number("kineticEnergy", above=0)
+    peak = d.number("peakWavenumber", 3.0, above=0)
+    highest = d.integer("maxWavenumber", 8, least=1)
+    return random_modes(peaked_spectrum(energy, peak, highest), seed)
+
+
+def _modes(d: Dictionary) -> FourierModes:
+    """A list of ((mx my mz) (real part of a) (imaginary part of a))."""
+    try:
+        rows = np.array([[list(v) for v in row] for row in d.raw("modes")], dtype=float)
+        m, real, imaginary = rows[:, 0], rows[:, 1], rows[:, 2]
+    except (TypeError, ValueError, IndexError):
+        raise d.fail(
+            "modes", "must be a list of ((mx my mz) (ax ay az) (bx by bz)), amplitude a + i b"
+        ) from None
+    if np.any(m != np.rint(m)):
+        raise d.fail("modes", "has a wavevector that is not whole numbers of waves per box")
+    a = real + 1j * imaginary
+    if np.any(np.abs((a * m).sum(axis=1)) > 1e-12 * np.abs(a).max()):
+        raise d.fail("modes", "has an amplitude that is not perpendicular to its wavevector")
+    return FourierModes(m.astype(int), a)
+
+
+def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
+    """Write a cell-centred velocity (3, nx, ny, nz) [m/s] as an OpenFOAM field, cells with x fastest
+    (blockMesh's order), in binary; boundary conditions and dimensions are those of `template`."""
+    if not np.all(np.isfinite(velocity)):
+        raise CaseError("the initial velocity is not finite")
+    text = template.read_text()
+    head, entry, tail = _split_internal_field(text, template)
+    cells = velocity.transpose(3, 2, 1, 0).reshape(-1, 3)
+    head = _binary_header(head)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with target.open("wb") as file:
+        file.write(f"{head}internalField   nonuniform List<vector>\n{len(cells)}\n(".encode())
+        file.write(np.ascontiguousarray(cells, dtype="<f8").tobytes())
+        file.write(f")\n;{tail}".encode())
+
+
+def _split_internal_field(text: str, path: Path) -> tuple[str, str, str]:
+    match = re.search(r"^internalField[^;]*;", text, flags=re.MULTILINE)
+    if match is None:
+        raise CaseError(f"{path}: the entry 'internalField' is missing")
+    return text[: match.start()], match.group(), text[match.end() :]
+
+
+def _binary_header(head: str) -> str:
+    return re.sub(r"(\bformat\s+)\w+;", r'\1binary;\n    arch        "LSB;label=32;scalar=64";', head, count=1)

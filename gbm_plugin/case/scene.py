@@ -1,0 +1,275 @@
+"""An OpenFOAM case read into one typed description of the scene: flow, forcing, families of fibers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from .dictionary import CaseError, Dictionary
+
+INTEGRATORS = ("ab3", "implicit", "auto")
+MOBILITIES = ("freeDrain", "rpy")
+BENDING_TORQUES = ("consistent", "asPrinted")
+CURVATURE_LAWS = ("sine", "discreteRod")
+TRANSPORTS = ("socket", "tcp", "file")
+SHAPES = ("straight",)
+
+
+@dataclass(frozen=True)
+class Model:
+    """How fibers are computed: the words of constant/fiberProperties, which a family may override."""
+
+    integrator: str = "ab3"
+    mobility: str = "freeDrain"
+    bending_torque: str = "consistent"
+    curvature_law: str = "sine"
+    strain_coupling: bool = False
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True)
+class Family:
+    """Fibers that are alike but for their place: `count` fibers of `beads` beads, length 2 a N [m],
+    bending stiffness K^b [N m2]."""
+
+    name: str
+    count: int
+    beads: int
+    length: float
+    bending_stiffness: float
+    seed: int
+    shape: str
+    model: Model
+
+    @property
+    def radius(self) -> float:
+        """Bead radius a [m]."""
+        return self.length / (2 * self.beads)
+
+
+@dataclass(frozen=True)
+class Forcing:
+    """An active entry of constant/fvOptions that drives turbulence, by its type, with its numbers."""
+
+    type: str
+    values: dict[str, float | str]
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """How OpenFOAM and the daemon talk; timeout in seconds."""
+
+    transport: str = "socket"
+    timeout: float = 120.0
+    host: str = "127.0.0.1"
+    port: int = 0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What both engines read of a case. SI units; `viscosity` is kinematic, nu [m2/s]."""
+
+    case: Path
+    application: str
+    viscosity: float
+    density: float
+    time_step: float
+    start_time: float
+    end_time: float
+    write_interval: float
+    forcing: Forcing | None
+    interpolation: str
+    record_interval: int
+    coupling: Coupling
+    families: tuple[Family, ...]
+    box: tuple[float, float, float] | None = None
+    origin: tuple[float, float, float] | None = None
+    cells: tuple[int, int, int] | None = None
+    texts: dict[str, str] = field(default_factory=dict, repr=False)
+
+    @property
+    def dynamic_viscosity(self) -> float:
+        """mu = rho nu [Pa s]."""
+        return self.density * self.viscosity
+
+
+def read_scene(case: Path | str) -> Scene:
+    """The scene of an OpenFOAM case. CaseError, in one line, for every mistake."""
+    case = Path(case)
+    if not case.is_dir():
+        raise CaseError(f"there is no case folder {case}")
+    control = Dictionary.read(case, "system/controlDict")
+    if "adjustTimeStep" in control and control.switch("adjustTimeStep"):
+        raise control.fail(
+            "adjustTimeStep",
+            "is yes: fibers move with a fixed time step; set it to no and deltaT to the smallest step needed",
+        )
+    time_step = control.number("deltaT", above=0)
+    box, origin, cells = _read_box(case)
+    fibers = Dictionary.read(case, "constant/fiberProperties")
+    scene = Scene(
+        case=case,
+        application=control.word("application", default="pimpleFoam"),
+        viscosity=Dictionary.read(case, "constant/transportProperties").number("nu", above=0),
+        density=fibers.number("rho", 1.0, above=0),
+        time_step=time_step,
+        start_time=control.number("startTime", 0.0),
+        end_time=control.number("endTime"),
+        write_interval=_write_interval(control, time_step),
+        forcing=_read_forcing(case),
+        interpolation=fibers.word("interpolation", default="trilinear"),
+        record_interval=fibers.integer("recordInterval", 10, least=1),
+        coupling=_read_coupling(fibers),
+        families=_read_families(fibers),
+        box=box,
+        origin=origin,
+        cells=cells,
+        texts=_texts(case),
+    )
+    fibers.done()
+    return scene
+
+
+def _write_interval(control: Dictionary, time_step: float) -> float:
+    """Time between writes [s]; infinite where OpenFOAM decides by other clocks."""
+    interval = control.number("writeInterval", math.inf)
+    kind = control.word("writeControl", default="timeStep")
+    if kind == "timeStep":
+        return interval * time_step
+    return interval if kind in ("runTime", "adjustable", "adjustableRunTime") else math.inf
+
+
+def _read_model(d: Dictionary, default: Model) -> Model:
+    model = replace(
+        default,
+        integrator=d.word("integrator", INTEGRATORS, default.integrator),
+        mobility=d.word("mobility", MOBILITIES, default.mobility),
+        bending_torque=d.word("bendingTorque", BENDING_TORQUES, default.bending_torque),
+        curvature_law=d.word("curvatureLaw", CURVATURE_LAWS, default.curvature_law),
+        strain_coupling=d.switch("strainCoupling", default.strain_coupling),
+        tolerance=d.number("tolerance", default.tolerance, above=0),
+    )
+    if model.strain_coupling and model.mobility == "freeDrain":
+        raise d.fail("strainCoupling", "is yes with mobility freeDrain, where it is nothing; it needs rpy")
+    if model.tolerance is not None and model.integrator == "ab3":
+        raise d.fail("tolerance", "goes with integrator implicit or auto; ab3 takes its step from eq. (10)")
+    return model
+
+
+def _read_families(fibers: Dictionary) -> tuple[Family, ...]:
+    model = _read_model(fibers, Model())
+    group = fibers.sub("families")
+    families = tuple(_read_family(name, d, model) for name, d in group.subs())
+    if not families:
+        raise fibers.fail("families", "is empty: at least one family of fibers is needed")
+    return families
+
+
+def _read_family(name: str, d: Dictionary, model: Model) -> Family:
+    beads = d.integer("beads", least=2)
+    length = d.number("length", None, above=0)
+    radius = d.number("radius", None, above=0)
+    if (length is None) == (radius is None):
+        raise CaseError(f"{d.where}: exactly one of the entries 'length' (2 a N) and 'radius' (a) is needed")
+    length = length if length is not None else 2 * radius * beads
+    stiffness = d.number("bendingStiffness", None, least=0)
+    modulus = d.number("youngModulus", None, least=0)
+    if (stiffness is None) == (modulus is None):
+        raise CaseError(
+            f"{d.where}: exactly one of the entries 'bendingStiffness' (K^b) and 'youngModulus' is needed"
+        )
+    if stiffness is None:
+        stiffness = modulus * math.pi * (length / beads) ** 4 / 64  # eq. (10): K^b = E pi d^4/64
+    family = Family(
+        name=name,
+        count=d.integer("count", least=1),
+        beads=beads,
+        length=length,
+        bending_stiffness=stiffness,
+        seed=d.integer("seed", 1, least=0),
+        shape=d.word("shape", SHAPES, "straight"),
+        model=_read_model(d, model),
+    )
+    d.done()
+    return family
+
+
+def _read_coupling(fibers: Dictionary) -> Coupling:
+    if "coupling" not in fibers:
+        fibers.raw("coupling", None)
+        return Coupling()
+    d = fibers.sub("coupling")
+    coupling = Coupling(
+        transport=d.word("transport", TRANSPORTS, "socket"),
+        timeout=d.number("timeout", 120.0, above=0),
+        host=d.word("host", default="127.0.0.1"),
+        port=d.integer("port", 0, least=0),
+    )
+    if coupling.port > 65535:
+        raise d.fail("port", f"is {coupling.port}; allowed: 0 (any free one) to 65535")
+    d.done()
+    return coupling
+
+
+def _read_forcing(case: Path) -> Forcing | None:
+    """The forcing that both engines know; other fvOptions are OpenFOAM's own business."""
+    if not (case / "constant/fvOptions").is_file():
+        return None
+    options = Dictionary.read(case, "constant/fvOptions")
+    forcing = None
+    for _name, d in options.subs():
+        kind = d.word("type")
+        if not d.switch("active", True) or kind not in ("linearForcing", "eswaranPope"):
+            continue
+        if forcing is not None:
+            raise CaseError(f"{options.where}: more than one active forcing")
+        coeffs = d.sub(f"{kind}Coeffs") if f"{kind}Coeffs" in d else d
+        forcing = _linear_forcing(coeffs) if kind == "linearForcing" else _eswaran_pope(coeffs)
+    return forcing
+
+
+def _linear_forcing(d: Dictionary) -> Forcing:
+    mode = d.word("mode", ("constantCoefficient", "constantPower"))
+    entry = "A" if mode == "constantCoefficient" else "power"
+    return Forcing("linearForcing", {"mode": mode, entry: d.number(entry, least=0)})
+
+
+def _eswaran_pope(d: Dictionary) -> Forcing:
+    values = {name: d.number(name, above=0) for name in ("variance", "timeScale", "cutoff")}
+    return Forcing("eswaranPope", {**values, "seed": d.integer("seed", 1, least=0)})
+
+
+def _read_box(case: Path) -> tuple:
+    """Size, origin and cells of a box of one uniform block in system/blockMeshDict; None each otherwise."""
+    nothing = (None, None, None)
+    if not (case / "system/blockMeshDict").is_file():
+        return nothing
+    d = Dictionary.read(case, "system/blockMeshDict")
+    try:
+        scale = d.number("convertToMeters", d.number("scale", 1.0))
+        vertices = [[float(x) * scale for x in v] for v in d.raw("vertices")]
+        blocks = d.raw("blocks")
+        cells = tuple(int(n) for n in blocks[2])
+        if len(vertices) != 8 or len(blocks) != 5 or len(cells) != 3:
+            return nothing
+    except (TypeError, ValueError, IndexError, KeyError):
+        return nothing
+    low = tuple(min(v[i] for v in vertices) for i in range(3))
+    high = tuple(max(v[i] for v in vertices) for i in range(3))
+    return tuple(h - o for h, o in zip(high, low, strict=True)), low, cells
+
+
+def _texts(case: Path) -> dict[str, str]:
+    """The dictionaries of the case as they are, for the recording."""
+    names = (
+        "constant/fiberProperties",
+        "constant/transportProperties",
+        "constant/fvOptions",
+        "system/controlDict",
+        "system/fvSchemes",
+        "system/fvSolution",
+        "system/blockMeshDict",
+        "system/initialFieldDict",
+    )
+    return {n: (case / n).read_text(errors="replace") for n in names if (case / n).is_file()}

@@ -1,0 +1,80 @@
+"""The daemon's side of a connection, whatever carries it: sockets (socket.py) or files (files.py)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+
+from ..case.scene import Coupling
+from .message import HEADER_SIZE, Kind, Message, ProtocolError, decode_header
+
+
+class CouplingError(RuntimeError):
+    """The coupling ended otherwise than agreed: names the cause, the peer and its log."""
+
+
+class Channel(ABC):
+    """Whole messages to and from one solver."""
+
+    def __init__(self, timeout: float, log: Path):
+        self.timeout = timeout
+        self._log = log
+
+    @abstractmethod
+    def _write(self, data: bytes) -> None: ...
+
+    @abstractmethod
+    def _read(self, size: int) -> bytes:
+        """Exactly this many bytes; CouplingError at the end of the connection or the timeout."""
+
+    @abstractmethod
+    def close(self) -> None: ...
+
+    def send(self, message: Message) -> None:
+        self._write(message.encode())
+
+    def receive(self) -> Message:
+        """The next message. CouplingError where the solver is gone, silent, or reports an error."""
+        try:
+            head, size = decode_header(self._read(HEADER_SIZE))
+        except ProtocolError as error:
+            raise self.error(str(error)) from None
+        message = Message(head.kind, head.step, head.time, self._read(size), head.flags)
+        if message.kind is Kind.ERROR:
+            raise self.error(f"OpenFOAM stopped: {message.payload.decode(errors='replace')}")
+        return message
+
+    def error(self, what: str) -> CouplingError:
+        return CouplingError(f"{what} (OpenFOAM's log: {self._log})")
+
+    def silent(self) -> CouplingError:
+        return self.error(
+            f"OpenFOAM was silent for {self.timeout:g} s (entry timeout of constant/fiberProperties)"
+        )
+
+
+class Listener(ABC):
+    """Where one solver can find the daemon. A context manager that leaves nothing behind."""
+
+    @abstractmethod
+    def accept(self, give_up: Callable[[], bool]) -> Channel | None:
+        """Wait for the solver, as long as it takes; None when `give_up` says so."""
+
+    @abstractmethod
+    def close(self) -> None: ...
+
+    def __enter__(self) -> Listener:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+
+def listen(case: Path, coupling: Coupling) -> Listener:
+    """Open the way that the case's word `transport` names."""
+    from .files import FileListener
+    from .sockets import TcpListener, UnixListener
+
+    kinds = {"socket": UnixListener, "tcp": TcpListener, "file": FileListener}
+    return kinds[coupling.transport](case, coupling)

@@ -1,0 +1,100 @@
+"""Messages as files in the folder `exchange` of the case, for sides that share only a file system."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from ..case.scene import Coupling
+from .channel import Channel, CouplingError, Listener
+from .message import HEADER_SIZE, Message, ProtocolError, decode_header
+from .sockets import POLL, write_secret
+
+
+class FileChannel(Channel):
+    """`<session>.flow.<n>` come in, `<session>.fibers.<n>` go out: written aside, then renamed."""
+
+    def __init__(self, folder: Path, session: str, timeout: float, log: Path):
+        super().__init__(timeout, log)
+        self._folder = folder
+        self._session = session
+        self._sent = 0
+        self._received = 0
+        self._data = b""
+
+    def incoming(self) -> Path:
+        return self._folder / f"{self._session}.flow.{self._received}"
+
+    def _write(self, data: bytes) -> None:
+        target = self._folder / f"{self._session}.fibers.{self._sent}"
+        part = target.with_name(target.name + ".part")
+        try:
+            part.write_bytes(data)
+            os.replace(part, target)
+        except OSError as error:
+            raise self.error(f"cannot write {target}: {error.strerror}") from None
+        self._sent += 1
+
+    def receive(self) -> Message:
+        self._data = self._next_file()
+        with contextlib.suppress(ProtocolError):
+            size = decode_header(self._data[:HEADER_SIZE])[1]
+            if len(self._data) != HEADER_SIZE + size:
+                raise self.error(f"message of the wrong length in {self._folder}")
+        return super().receive()
+
+    def _next_file(self) -> bytes:
+        path = self.incoming()
+        deadline = time.monotonic() + self.timeout
+        pause = 5e-5
+        while not path.exists():
+            if time.monotonic() > deadline:
+                raise self.silent()
+            time.sleep(pause)
+            pause = min(1.1 * pause, 0.02)  # a part of what was waited for already: hardly late, never busy
+        data = path.read_bytes()
+        path.unlink()
+        self._received += 1
+        return data
+
+    def _read(self, size: int) -> bytes:
+        data, self._data = self._data[:size], self._data[size:]
+        if len(data) < size:
+            raise self.error("short message")
+        return data
+
+    def close(self) -> None:
+        pass
+
+
+class FileListener(Listener):
+    """Owns `exchange`: a new session word tells messages of this run from stale ones, which it removes."""
+
+    def __init__(self, case: Path, coupling: Coupling):
+        self.case = case
+        self.timeout = coupling.timeout
+        self.folder = case / "exchange"
+        self.session = secrets.token_hex(8)
+        try:
+            self.folder.mkdir(mode=0o700, exist_ok=True)
+            for stale in self.folder.iterdir():
+                stale.unlink()
+        except OSError as error:
+            raise CouplingError(f"cannot use the folder {self.folder}: {error.strerror}") from None
+        write_secret(self.folder / "session", self.session + "\n")
+
+    def accept(self, give_up: Callable[[], bool]) -> Channel | None:
+        channel = FileChannel(self.folder, self.session, self.timeout, self.case / "log.pimpleFoam")
+        while not give_up():
+            if channel.incoming().exists():
+                return channel
+            time.sleep(POLL / 10)
+        return None
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            (self.folder / "session").unlink()

@@ -1,0 +1,167 @@
+"""All families of a scene as one: flat bead arrays outside, one stepper for each family inside."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..case.scene import Family, Scene
+from ..fiber import Fibers, Stepper
+from .message import NEEDS
+
+STATE_FILE = "uniform/fibers.npz"
+
+
+class Fleet:
+    """The fibers of a scene on their way through time.
+
+    Positions are (B, 3), B the beads of all families one after the other. The calls follow those of
+    `fiber.Stepper`.
+    """
+
+    def __init__(self, families: Sequence[Family], steppers: Sequence[Stepper]):
+        self.families = tuple(families)
+        self.steppers = tuple(steppers)
+        ends = np.cumsum([f.count * f.beads for f in families])
+        self._slices = [slice(e - f.count * f.beads, e) for e, f in zip(ends, families, strict=True)]
+        self.beads = int(ends[-1])
+
+    @classmethod
+    def seeded(cls, scene: Scene, box_min, box_max, time: float) -> Fleet:
+        """New fibers at random places and orientations in the box."""
+        size = np.subtract(box_max, box_min)
+        steppers = []
+        for f in scene.families:
+            fibers = Fibers.straight(
+                f.count,
+                f.beads,
+                f.length,
+                f.bending_stiffness,
+                scene.dynamic_viscosity,
+                box=size,
+                seed=f.seed,
+                bending_torque=f.model.bending_torque,
+                curvature_law=f.model.curvature_law,
+            )
+            if np.any(box_min):
+                fibers = fibers.shifted(box_min)
+            steppers.append(
+                Stepper(
+                    fibers,
+                    time=time,
+                    integrator=f.model.integrator,
+                    mobility=f.model.mobility,
+                    strain_coupling=f.model.strain_coupling,
+                    tolerance=f.model.tolerance,
+                )
+            )
+        return cls(scene.families, steppers)
+
+    @property
+    def need(self) -> str:
+        """What must be sampled for all families: "velocity", "rotation" or "gradient"."""
+        return max((s.need for s in self.steppers), key=NEEDS.index)
+
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        return [(f.count, f.beads) for f in self.families]
+
+    @property
+    def positions(self) -> np.ndarray:
+        return np.concatenate([s.positions.reshape(-1, 3) for s in self.steppers])
+
+    @property
+    def by_family(self) -> list[np.ndarray]:
+        """Positions (count, beads, 3) of each family."""
+        return [s.positions for s in self.steppers]
+
+    def observe(self, time: float, velocity: np.ndarray, extra: np.ndarray | None) -> None:
+        for family, stepper, part in zip(self.families, self.steppers, self._slices, strict=True):
+            shape = (family.count, family.beads)
+            stepper.observe(
+                time,
+                velocity[part].reshape(*shape, 3),
+                _ambient(stepper.need, extra, part, shape),
+            )
+
+    def advance(self, time_step: float) -> None:
+        for s in self.steppers:
+            s.advance(time_step)
+
+    @property
+    def provisional(self) -> bool:
+        return any(s.provisional for s in self.steppers)
+
+    def correct(self) -> None:
+        for s in self.steppers:
+            if s.provisional:
+                s.correct()
+
+    @property
+    def prediction_gap(self) -> float:
+        """Largest rms over a fiber of |predicted - received| ambient velocity [m/s]."""
+        return float(max(np.max(s.prediction_gap, initial=0.0) for s in self.steppers))
+
+    def end_to_end_ratio(self) -> list[float]:
+        """<R^2>/L^2 of each family, L = 2a(N - 1) between the end beads' centres."""
+        ratios = []
+        for family, x in zip(self.families, self.by_family, strict=True):
+            contour = 2 * family.radius * (family.beads - 1)
+            ratios.append(float(np.mean(np.sum((x[:, -1] - x[:, 0]) ** 2, axis=-1)) / contour**2))
+        return ratios
+
+    def _signature(self) -> str:
+        return json.dumps([[f.name, f.count, f.beads, f.length] for f in self.families])
+
+    def save(self, folder: Path, step: int, time: float) -> None:
+        """Write the whole state into a time folder; the file appears only when it is complete."""
+        arrays = {
+            f"{family.name}/{key}": value
+            for family, stepper in zip(self.families, self.steppers, strict=True)
+            for key, value in stepper.state().items()
+        }
+        buffer = io.BytesIO()
+        np.savez(buffer, signature=self._signature(), step=step, time=time, **arrays)
+        path = folder / STATE_FILE
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        with part.open("wb") as file:
+            file.write(buffer.getbuffer())
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+
+    def restore(self, folder: Path) -> None:
+        """Continue from the state in a time folder. ValueError where it is of other fibers or unreadable."""
+        path = folder / STATE_FILE
+        try:
+            with np.load(path) as data:
+                if str(data["signature"]) != self._signature():
+                    raise ValueError(
+                        f"{path} holds the families {data['signature']} (name, count, beads, length), "
+                        f"constant/fiberProperties says {self._signature()}: "
+                        "restore the dictionary, or start afresh"
+                    )
+                for family, stepper in zip(self.families, self.steppers, strict=True):
+                    prefix = f"{family.name}/"
+                    stepper.restore({k.removeprefix(prefix): data[k] for k in data.files if k.startswith(prefix)})
+        except (OSError, KeyError, zipfile.BadZipFile) as error:
+            raise ValueError(f"the fiber state {path} cannot be read: {error}") from None
+
+
+def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int, int]) -> np.ndarray | None:
+    """What one family needs, of what was sampled for all."""
+    if need == "velocity" or extra is None:
+        return None
+    extra = extra[part]
+    if need == "rotation" and extra.ndim == 3:
+        g = extra
+        curl = (g[:, 2, 1] - g[:, 1, 2], g[:, 0, 2] - g[:, 2, 0], g[:, 1, 0] - g[:, 0, 1])
+        extra = 0.5 * np.stack(curl, axis=-1)
+    return extra.reshape(*shape, *extra.shape[1:])

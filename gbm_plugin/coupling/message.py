@@ -1,0 +1,138 @@
+"""The messages of the coupling protocol; docs/protocol.md has the layout, openfoam/.../message.H the C++ side."""
+
+from __future__ import annotations
+
+import enum
+import math
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+MAGIC = b"GBMC"
+VERSION = 1
+MAX_SIZE = 1 << 36  # no payload is larger [bytes]
+
+_HEADER = struct.Struct("<4sHHIIqdQ")
+HEADER_SIZE = _HEADER.size
+
+PROVISIONAL = 1  # flag of POSITIONS: these will be corrected after their sample
+STOP = 2  # flag of POSITIONS: write and stop after the next step
+
+
+class Kind(enum.IntEnum):
+    HELLO = 1  # flow -> fibers: the physical values of the run
+    WELCOME = 2  # fibers -> flow: the families, the field wanted
+    POSITIONS = 3  # fibers -> flow: bead centres
+    SAMPLE = 4  # flow -> fibers: ambient flow at those positions
+    SAVE = 5  # flow -> fibers: folder for the state of this step
+    END = 6  # flow -> fibers: no more steps
+    GOODBYE = 7  # fibers -> flow: everything is on disk
+    ERROR = 8  # either way: one line, then the connection ends
+
+
+class ProtocolError(Exception):
+    """What arrived is not a message of this protocol, or not the one that must come now."""
+
+
+@dataclass(frozen=True)
+class Message:
+    kind: Kind
+    step: int
+    time: float
+    payload: bytes = b""
+    flags: int = 0
+
+    def encode(self) -> bytes:
+        return encode_header(self) + self.payload
+
+
+def encode_header(m: Message) -> bytes:
+    return _HEADER.pack(MAGIC, VERSION, m.kind, m.flags, 0, m.step, m.time, len(m.payload))
+
+
+def decode_header(data: bytes) -> tuple[Message, int]:
+    """The message without its payload, and the payload's size [bytes]. ProtocolError where it is none."""
+    if len(data) != HEADER_SIZE:
+        raise ProtocolError(f"short message: {len(data)} bytes where a header has {HEADER_SIZE}")
+    magic, version, kind, flags, _, step, time, size = _HEADER.unpack(data)
+    if magic != MAGIC:
+        raise ProtocolError("what arrived is not a message of a gbm plugin")
+    if version != VERSION:
+        raise ProtocolError(
+            f"the plugin speaks version {version} of the coupling protocol, this daemon {VERSION}: "
+            "rebuild the plugin with ./Allwmake"
+        )
+    if kind not in Kind.__members__.values():
+        raise ProtocolError(f"message of unknown kind {kind}")
+    if size > MAX_SIZE:
+        raise ProtocolError(f"{Kind(kind).name} announces {size} bytes: not a message")
+    if not math.isfinite(time):
+        raise ProtocolError(f"{Kind(kind).name} of step {step} has the time {time}")
+    return Message(Kind(kind), step, time, flags=flags), size
+
+
+@dataclass(frozen=True)
+class Hello:
+    """The values that OpenFOAM runs with. SI units; folder: of the start time, relative to the case."""
+
+    viscosity: float
+    time_step: float
+    box_min: tuple[float, float, float]
+    box_max: tuple[float, float, float]
+    cells: int
+    folder: str
+    token: str
+
+    _FIXED = struct.Struct("<9dq")
+
+    def encode(self) -> bytes:
+        folder = self.folder.encode()
+        values = (self.viscosity, self.time_step, *self.box_min, *self.box_max, float(self.cells))
+        return self._FIXED.pack(*values, len(folder)) + folder + self.token.encode()
+
+    @classmethod
+    def decode(cls, payload: bytes) -> Hello:
+        size = cls._FIXED.size
+        if len(payload) < size:
+            raise ProtocolError(f"HELLO has {len(payload)} bytes: at least {size} are needed")
+        *values, length = cls._FIXED.unpack(payload[:size])
+        if not all(map(math.isfinite, values)) or not 0 <= length <= len(payload) - size:
+            raise ProtocolError("HELLO holds values that are not finite, or a folder that is cut off")
+        try:
+            folder = payload[size : size + length].decode()
+            token = payload[size + length :].decode()
+        except UnicodeDecodeError:
+            raise ProtocolError("HELLO holds a text that is not UTF-8") from None
+        return cls(values[0], values[1], tuple(values[2:5]), tuple(values[5:8]), int(values[8]), folder, token)
+
+
+NEEDS = ("velocity", "rotation", "gradient")
+
+
+def encode_welcome(need: str, families: list[tuple[int, int]]) -> bytes:
+    """need: what to sample; families: (count, beads) of each."""
+    flat = [n for family in families for n in family]
+    return struct.pack(f"<{2 + len(flat)}q", NEEDS.index(need), len(families), *flat)
+
+
+def encode_array(values: np.ndarray) -> bytes:
+    return np.ascontiguousarray(values, dtype="<f8").tobytes()
+
+
+def decode_sample(m: Message, beads: int, need: str) -> tuple[np.ndarray, np.ndarray | None]:
+    """Velocity (B, 3) and rotation (B, 3) or gradient (B, 3, 3), [b, i, j] = du_i/dx_j.
+
+    ProtocolError where the length is wrong or a value is not finite.
+    """
+    extra = {"velocity": (), "rotation": (3,), "gradient": (3, 3)}[need]
+    numbers = beads * (3 + int(np.prod(extra)) * (need != "velocity"))
+    if len(m.payload) != 8 * numbers:
+        raise ProtocolError(
+            f"SAMPLE of step {m.step} has {len(m.payload)} bytes: {beads} beads with {need} need {8 * numbers}"
+        )
+    values = np.frombuffer(m.payload, dtype="<f8")
+    if not np.all(np.isfinite(values)):
+        raise ProtocolError(f"SAMPLE of step {m.step} holds values that are not finite")
+    velocity = values[: 3 * beads].reshape(beads, 3)
+    return velocity, (values[3 * beads :].reshape(beads, *extra) if extra else None)

@@ -1,0 +1,178 @@
+"""Stream sockets: a Unix socket in the case, or TCP with a token in a file that only the owner reads."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import select
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from ..case.scene import Coupling
+from .channel import Channel, CouplingError, Listener
+from .message import Kind, Message
+
+POLL = 0.2  # how often a wait for the first connection looks whether to give up [s]
+
+
+class SocketChannel(Channel):
+    def __init__(self, connection: socket.socket, server: socket.socket, timeout: float, log: Path):
+        super().__init__(timeout, log)
+        self._socket = connection
+        self._server = server
+        self._socket.setblocking(False)
+
+    def _wait(self, event: int, deadline: float) -> None:
+        """Until the socket is ready; a second solver that knocks meanwhile is told so."""
+        poll = select.poll()
+        poll.register(self._socket, event)
+        poll.register(self._server, select.POLLIN)
+        while True:
+            left = deadline - time.monotonic()
+            if left <= 0:
+                raise self.silent()
+            ready = [fd for fd, _ in poll.poll(1000 * left)]
+            if self._server.fileno() in ready:
+                self._refuse_second()
+            if self._socket.fileno() in ready:
+                return
+
+    def _refuse_second(self) -> None:
+        second, _ = self._server.accept()
+        text = b"another solver is connected to this daemon: two runs in one case?"
+        with second, contextlib.suppress(OSError):
+            second.settimeout(1.0)
+            second.sendall(Message(Kind.ERROR, 0, 0.0, text).encode())
+            second.shutdown(socket.SHUT_WR)
+            while second.recv(4096):  # unread bytes would reset the connection before it has read the text
+                pass
+
+    def _write(self, data: bytes) -> None:
+        deadline = time.monotonic() + self.timeout
+        view = memoryview(data)
+        while view:
+            self._wait(select.POLLOUT, deadline)
+            try:
+                view = view[self._socket.send(view) :]
+            except BlockingIOError:
+                continue
+            except OSError as error:
+                raise self.error(f"OpenFOAM is gone: {error.strerror}") from None
+
+    def _read(self, size: int) -> bytes:
+        deadline = time.monotonic() + self.timeout
+        data = bytearray()
+        while len(data) < size:
+            self._wait(select.POLLIN, deadline)
+            try:
+                part = self._socket.recv(min(size - len(data), 1 << 20))
+            except BlockingIOError:
+                continue
+            except OSError as error:
+                raise self.error(f"OpenFOAM is gone: {error.strerror}") from None
+            if not part:
+                raise self.error("OpenFOAM closed the connection before its end")
+            data += part
+        return bytes(data)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class SocketListener(Listener):
+    """What Unix sockets and TCP have in common."""
+
+    server: socket.socket
+
+    def __init__(self, case: Path, coupling: Coupling):
+        self.case = case
+        self.timeout = coupling.timeout
+
+    def accept(self, give_up: Callable[[], bool]) -> Channel | None:
+        self.server.settimeout(POLL)
+        while not give_up():
+            with contextlib.suppress(TimeoutError):
+                connection, _ = self.server.accept()
+                return SocketChannel(connection, self.server, self.timeout, self.case / "log.pimpleFoam")
+        return None
+
+
+class UnixListener(SocketListener):
+    """`gbm.sock` in the case, mode 0600."""
+
+    def __init__(self, case: Path, coupling: Coupling):
+        super().__init__(case, coupling)
+        # through the folder's descriptor: a socket's path holds 107 characters, and a case may lie deeper
+        self._folder = os.open(case, os.O_PATH | os.O_DIRECTORY)
+        address = f"/proc/self/fd/{self._folder}/gbm.sock"
+        self.path = case / "gbm.sock"
+        self.server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._remove_stale(address)
+            old = os.umask(0o177)
+            try:
+                self.server.bind(address)
+            finally:
+                os.umask(old)
+        except OSError as error:
+            raise CouplingError(f"cannot make the socket {self.path}: {error.strerror}") from None
+        self.server.listen(4)
+
+    def _remove_stale(self, address: str) -> None:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            try:
+                probe.connect(address)
+            except FileNotFoundError:
+                return
+            except ConnectionRefusedError:  # left by a daemon that was killed
+                os.unlink(address)
+                return
+        raise CouplingError(f"another daemon serves this case on {self.path}")
+
+    def close(self) -> None:
+        self.server.close()
+        with contextlib.suppress(OSError):
+            self.path.unlink()
+        os.close(self._folder)
+
+
+class TcpListener(SocketListener):
+    """A port, by default on the loopback address, named with a secret in `gbm.tcp`, mode 0600."""
+
+    def __init__(self, case: Path, coupling: Coupling):
+        super().__init__(case, coupling)
+        self.token = secrets.token_hex(16)
+        self.path = case / "gbm.tcp"
+        try:
+            self.server = socket.create_server((coupling.host, coupling.port), backlog=4)
+        except OSError as error:
+            raise CouplingError(
+                f"cannot listen on {coupling.host} port {coupling.port}: {error.strerror}"
+            ) from None
+        port = self.server.getsockname()[1]
+        write_secret(self.path, f"{coupling.host} {port} {self.token}\n")
+
+    def accept(self, give_up: Callable[[], bool]) -> Channel | None:
+        channel = super().accept(give_up)
+        if channel is not None:
+            channel._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return channel
+
+    def close(self) -> None:
+        self.server.close()
+        with contextlib.suppress(OSError):
+            self.path.unlink()
+
+
+def write_secret(path: Path, text: str) -> None:
+    """A whole file that only the owner reads, in one step."""
+    part = path.with_suffix(".part")
+    try:
+        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w") as file:
+            file.write(text)
+        os.replace(part, path)
+    except OSError as error:
+        raise CouplingError(f"cannot write {path}: {error.strerror}") from None
