@@ -22,8 +22,8 @@ _FORMAT = ("v110", "v110")  # HDF5 1.10: its index of appended chunks never has 
 class FamilyRecord:
     """One family of equal fibers: what a reader needs to know about it.
 
-    radius is the bead radius a [m]; bending_stiffness K^b [N m²], one number or one per fiber; model holds the
-    words of the fiber model (mobility, integrator, curvatureLaw, ...).
+    radius is the bead radius a [m]; bending_stiffness K^b [N m²], one number or one per fiber; model holds
+    the words of the fiber model (mobility, integrator, curvatureLaw, ...).
     """
 
     name: str
@@ -39,11 +39,14 @@ class FamilyRecord:
         if not self.name or "/" in self.name or self.name == ".":
             raise ValueError(f"{where}: the name must be one word without a slash")
         if self.count < 1 or self.beads < 2:
-            raise ValueError(f"{where}: count {self.count}, beads {self.beads}; allowed are count >= 1, beads >= 2")
+            raise ValueError(
+                f"{where}: count {self.count}, beads {self.beads}; allowed are count >= 1, beads >= 2"
+            )
         if not (np.isfinite(self.radius) and self.radius > 0):
             raise ValueError(f"{where}: radius is {self.radius}; allowed is a finite number > 0")
         stiffness = np.asarray(self.bending_stiffness, dtype=float)
-        if stiffness.shape not in ((), (self.count,)) or not np.all(np.isfinite(stiffness) & (stiffness >= 0)):
+        allowed = np.isfinite(stiffness) & (stiffness >= 0)
+        if stiffness.shape not in ((), (self.count,)) or not allowed.all():
             raise ValueError(
                 f"{where}: bending_stiffness must be one number >= 0 or {self.count} of them, "
                 f"not an array of shape {stiffness.shape} with minimum {stiffness.min(initial=np.inf):g}"
@@ -58,12 +61,12 @@ class FamilyRecord:
 class Recorder:
     """Appends the positions of fiber families to a new HDF5 file.
 
-    Every append is one transaction: whenever the process dies, and when the disk fills, all earlier records stay
-    readable. No handle on the file is kept between appends, so others may read it at any time.
+    Every append is one transaction: whenever the process dies, and when the disk fills, all earlier records
+    stay readable. No handle on the file is kept between appends, so others may read it at any time.
 
-    box_origin, box_size: (3,) [m]; viscosity: dynamic [Pa s]; density [kg/m³]; dictionaries: text of the case's
-    dictionaries by file name. Raises FileExistsError if the file exists, FileFullError (an OSError) if there is
-    no room for it, ValueError for values that are not allowed.
+    box_origin, box_size: (3,) [m]; viscosity: dynamic [Pa s]; density [kg/m³]; dictionaries: text of the
+    case's dictionaries by file name. Raises FileExistsError if the file exists, FileFullError (an OSError) if
+    there is no room for it, ValueError for values that are not allowed.
     """
 
     def __init__(
@@ -93,18 +96,18 @@ class Recorder:
             shape = (3,) if name.startswith("box") else ()
             positive = name == "box_origin" or np.all(value > 0)
             if value.shape != shape or not np.all(np.isfinite(value)) or not positive:
-                raise ValueError(f"{self.path}: {name} is {value}; allowed are finite values, shape {shape}, > 0")
+                raise ValueError(
+                    f"{self.path}: {name} is {value}; allowed are finite values, shape {shape}, > 0"
+                )
         self._last: tuple[int, float] | None = None
         self._closed = False
         self._create(scene, dictionaries, program_version)
 
     def _create(self, scene: dict, dictionaries: Mapping[str, str], program_version: str) -> None:
+        if self.path.exists():
+            raise FileExistsError(f"{self.path} exists and is not overwritten; move it away or delete it")
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            self.path.touch(exist_ok=False)
-        except FileExistsError:
-            raise FileExistsError(f"{self.path} exists and is not overwritten; move it away or delete it") from None
-        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}")  # the file appears complete
         try:
             draft.touch()
             with Transaction(draft, writable=True) as changes:
@@ -112,10 +115,10 @@ class Recorder:
                     self._write_header(file, scene, dictionaries, program_version)
                 changes.publish()
             draft.replace(self.path)
-        except BaseException:
+        except FileFullError as error:
+            raise FileFullError(error.errno, f"{self.path} not created: {error.strerror}") from None
+        finally:
             draft.unlink(missing_ok=True)
-            self.path.unlink(missing_ok=True)
-            raise
 
     def _write_header(self, file, scene: dict, dictionaries: Mapping[str, str], program_version: str) -> None:
         file.attrs["schema_version"] = SCHEMA_VERSION
@@ -141,8 +144,8 @@ class Recorder:
         """Add one record: positions[i] (F, N, 3) [m] of family i, unwrapped, at `time` [s], flow step `step`.
 
         Raises ValueError for another shape or a time or step that does not advance, FloatingPointError for a
-        value that is not finite, FileFullError (an OSError) if there is no room; the file then holds all earlier
-        records and the call may be repeated.
+        value that is not finite, FileFullError (an OSError) if there is no room; the file then holds all
+        earlier records and the call may be repeated.
         """
         if self._closed:
             raise ValueError(f"{self.path}: the recorder is closed")
@@ -160,14 +163,17 @@ class Recorder:
         except FileFullError as error:
             kept = "no record" if self._last is None else f"all records up to step {self._last[0]}"
             raise FileFullError(
-                error.errno, f"recording of step {step} (time {time:g} s) failed: {error.strerror}; {kept} kept"
+                error.errno,
+                f"{self.path}: step {step}, time {time:g} s, not recorded: {error.strerror}; {kept} kept",
             ) from None
         self._last = step, time
 
     def _checked(self, step: int, time: float, positions: Sequence[ArrayLike]) -> list[np.ndarray]:
         where = f"step {step}, time {time:g} s"
         if len(positions) != len(self.families):
-            raise ValueError(f"{where}: {len(positions)} arrays of positions for {len(self.families)} families")
+            raise ValueError(
+                f"{where}: {len(positions)} arrays of positions for {len(self.families)} families"
+            )
         if not np.isfinite(time):
             raise FloatingPointError(f"{where}: the time is not finite")
         if self._last is not None and (step <= self._last[0] or time <= self._last[1]):
@@ -176,12 +182,14 @@ class Recorder:
         for family, array in zip(self.families, arrays, strict=True):
             if array.shape != family.shape:
                 raise ValueError(
-                    f"{where}: positions of family {family.name!r} have shape {array.shape}, not {family.shape}"
+                    f"{where}: positions of family {family.name!r} have shape {array.shape}, "
+                    f"not {family.shape}"
                 )
             broken = ~np.isfinite(array).all(axis=(1, 2))
             if broken.any():
                 raise FloatingPointError(
-                    f"{where}: a position of fiber {int(broken.argmax())} of family {family.name!r} is not finite"
+                    f"{where}: a position of fiber {int(broken.argmax())} of family {family.name!r} "
+                    f"is not finite"
                 )
         return arrays
 

@@ -153,7 +153,8 @@ class _Part:
             if isinstance(node, h5py.Dataset):
                 texts[name] = node.asstr()[()]
 
-        self.file.get("dictionaries", {}) and self.file["dictionaries"].visititems(collect)
+        if "dictionaries" in self.file:
+            self.file["dictionaries"].visititems(collect)
         values["dictionaries"] = texts
         return values
 
@@ -166,8 +167,8 @@ def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
     """Open a recording: one file, a folder ``postProcessing/fibers`` of a case, or a list of files.
 
     The files of a list are the parts of one run; where their times overlap, the one that starts later counts.
-    Raises FileNotFoundError if there is none, ValueError if one is not a recording, has another schema version, or
-    holds other families than the rest.
+    Raises FileNotFoundError if there is none, ValueError if one is not a recording, has another schema
+    version, or holds other families than the rest.
     """
     paths = [paths] if isinstance(paths, (str, Path)) else list(paths)
     files = []
@@ -183,7 +184,9 @@ def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
         for part in parts[1:]:
             shapes = [{name: family.shape for name, family in p.families.items()} for p in (first, part)]
             if shapes[0] != shapes[1]:
-                raise ValueError(f"{part.path} holds families {shapes[1]}, {first.path} {shapes[0]}: not one run")
+                raise ValueError(
+                    f"{part.path} holds families {shapes[1]}, {first.path} {shapes[0]}: not one run"
+                )
     except BaseException:
         for part in parts:
             part.close()
@@ -207,8 +210,7 @@ def _counts(parts: list[_Part]) -> list[int]:
     counts = []
     limit = np.inf
     for part in reversed(parts):
-        interval = np.min(np.diff(part.times), initial=np.inf)
-        tolerance = _SAME_TIME * interval if np.isfinite(interval) else 1e-9 * abs(limit if limit < np.inf else 0)
+        tolerance = _SAME_TIME * np.diff(part.times).min() if len(part.times) > 1 else 0.0
         counts.append(int(np.searchsorted(part.times, limit - tolerance)))
         limit = min(limit, part.times[0]) if len(part.times) else limit
     return counts[::-1]

@@ -37,8 +37,7 @@ class Transaction(io.RawIOBase):
 
     def __init__(self, path: Path | str, *, writable: bool) -> None:
         super().__init__()
-        self.path = Path(path)
-        self._fd = os.open(self.path, os.O_RDWR if writable else os.O_RDONLY)
+        self._fd = os.open(path, os.O_RDWR if writable else os.O_RDONLY)
         self._base = os.fstat(self._fd).st_size  # bytes below are pages of the file, above is new
         self._pages: dict[int, bytearray] = {}
         self._new = bytearray()
@@ -158,7 +157,7 @@ class Transaction(io.RawIOBase):
             needed = len(self._new) + len(journal) + len(footer)
             raise FileFullError(
                 error.errno,
-                f"{self.path}: no room for {needed} more bytes ({os.strerror(error.errno).lower()})",
+                f"no room for {needed} more bytes ({os.strerror(error.errno).lower()})",
             ) from None
         self._base, self._new = end, bytearray()
         self._apply()

@@ -62,9 +62,9 @@ def link_length_error(positions: ArrayLike, radius: float) -> float:
 def curvature(positions: ArrayLike, radius: float, law: str = "sine") -> NDArray[np.float64]:
     """Curvature at the inner beads, (..., N−2) [1/m], never negative.
 
-    sine: |t_i × t_{i+1}|/2a, eqs. (4) and (5), which falls again beyond 90°; discreteRod: 2 tan(θ/2)/2a with θ
-    the angle between the links (Bergou et al. 2008), which does not. Raises ValueError for a wrong shape, radius
-    or law.
+    sine: |t_i × t_{i+1}|/2a, eqs. (4) and (5), which falls again beyond 90°; discreteRod: 2 tan(θ/2)/2a with
+    θ the angle between the links (Bergou et al. 2008), which does not and is infinite at a fold.
+    Raises ValueError for a wrong shape, radius or law.
     """
     if law not in CURVATURE_LAWS:
         raise ValueError(f"curvature law is {law!r}; allowed are {', '.join(CURVATURE_LAWS)}")
