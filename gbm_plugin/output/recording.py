@@ -11,14 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .recorder import SCHEMA_VERSION, FamilyRecord, Recorder
+from .restarts import files_by_start, kept
 from .transaction import Transaction
 
 __all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open_recording"]
-
-# A restart writes its start time again, in as many digits as OpenFOAM's time names have: records closer than
-# this fraction of the recording interval are the same one.
-_SAME_TIME = 1e-3
-
 
 class Positions:
     """Positions (S, F, N, 3) [m] of one family, read from the files when indexed; numpy's basic indexing."""
@@ -75,7 +71,7 @@ class Recording:
     def __init__(self, parts: list[_Part]) -> None:
         self._parts = parts
         last = parts[-1]
-        counts = _counts(parts)
+        counts = kept([part.times for part in parts])
         self.paths = [part.path for part in parts]
         self.times = np.concatenate([part.times[:count] for part, count in zip(parts, counts, strict=True)])
         self.steps = np.concatenate([part.steps[:count] for part, count in zip(parts, counts, strict=True)])
@@ -173,7 +169,7 @@ def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
     paths = [paths] if isinstance(paths, (str, Path)) else list(paths)
     files = []
     for path in map(Path, paths):
-        files += sorted(path.glob("*/fibers.h5"), key=lambda file: _start(file)) if path.is_dir() else [path]
+        files += files_by_start(path, "fibers.h5") if path.is_dir() else [path]
     if not files:
         raise FileNotFoundError(f"no fiber recording ({', '.join(map(str, paths)) or 'an empty list'})")
     parts: list[_Part] = []
@@ -196,21 +192,3 @@ def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
         if filled and part not in filled:
             part.close()
     return Recording(sorted(filled, key=lambda part: part.times[0]) or parts[-1:])
-
-
-def _start(file: Path) -> float:
-    try:
-        return float(file.parent.name)
-    except ValueError:
-        raise ValueError(f"{file}: its folder must be named after a start time") from None
-
-
-def _counts(parts: list[_Part]) -> list[int]:
-    """How many records of each part come before all later parts."""
-    counts = []
-    limit = np.inf
-    for part in reversed(parts):
-        tolerance = _SAME_TIME * np.diff(part.times).min() if len(part.times) > 1 else 0.0
-        counts.append(int(np.searchsorted(part.times, limit - tolerance)))
-        limit = min(limit, part.times[0]) if len(part.times) else limit
-    return counts[::-1]
