@@ -1,0 +1,7 @@
+"""The Gears Bead Model: fibers of touching beads that bend, do not stretch, and roll on each other."""
+
+from .fibers import Fibers
+from .simulate import Trajectory, simulate
+from .stepper import Stepper
+
+__all__ = ["Fibers", "Stepper", "Trajectory", "simulate"]

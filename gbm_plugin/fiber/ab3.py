@@ -1,0 +1,117 @@
+"""Third-order Adams–Bashforth steps for links that turn, with a consistent start.
+
+The rotation vector of a step from t to t + h with rates w_n, w_(n−1), w_(n−2) is ∫w of the polynomial through them,
+plus the leading Magnus term −(h³/12) w_n × w', w' = (w_n − w_(n−1))/(t_n − t_(n−1)), since rotations do not commute.
+The first two steps, without history, are midpoint steps: their error is of third order, once.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+from .free_drain import link_rates
+from .layout import rotated
+from .simd import add, add_scaled, cross, dot, larger, load, load3, scale, splat, sqrt, store, store3, subtract
+
+STAGES = 2  # flow evaluations per step that the plan holds: at its start, and in its middle (used by the start)
+
+
+def plan(ages: list[float], step: float, count: int) -> np.ndarray:
+    """Weights of each of count steps, a row: w_n, w_(n−1), w_(n−2); w_n × w_(n−1); third less second order; start.
+
+    ages: how long before the first step's start the rates w_(n−1), w_(n−2) were taken, as many as there are.
+    """
+    rows = np.zeros((count, 8))
+    ages = list(ages)
+    for row in rows:
+        if len(ages) < 2:
+            row[0], row[7] = step, 1.0
+        else:
+            # ∫ over [0, h] of the Lagrange polynomials at the nodes 0, −p, −q
+            p, q = ages[:2]
+            h2, h3 = step**2 / 2, step**3 / 3
+            row[0] = step + (h2 * (p + q) + h3) / (p * q)
+            row[1] = (h3 + q * h2) / (p * (p - q))
+            row[2] = (h3 + p * h2) / (q * (q - p))
+            row[3] = step**3 / (12 * p)
+            row[4:7] = row[:3] - (step + h2 / p, -h2 / p, 0)
+        ages = [step, *(age + step for age in ages[:1])]
+    return rows
+
+
+@njit(forceinline=True)
+def _blend(samples, b, weights, out):
+    """Ambient field of block b: the weighted sum of samples (3, B, 3N, LANES), or the one sample it equals."""
+    if weights[0] == 1.0 and weights[1] == 0.0 and weights[2] == 0.0:
+        return samples[0][b]
+    for i in range(out.shape[0] // 3):
+        value = scale(weights[0], load3(samples[0][b], i))
+        value = add_scaled(value, weights[1], load3(samples[1][b], i))
+        store3(out, i, add_scaled(value, weights[2], load3(samples[2][b], i)))
+    return out
+
+
+@njit(forceinline=True)
+def _turn_links(state, angles, factor, out):
+    """out = state with links turned by factor × angles and the centre moved by factor × its velocity."""
+    links = state.shape[0] // 3 - 1
+    for i in range(links):
+        store3(out, i, rotated(load3(state, i), scale(factor, load3(angles, i))))
+    store3(out, links, add_scaled(load3(state, links), factor, load3(angles, links)))
+
+
+@njit(parallel=True, cache=True)
+def advance(state, newest, older, velocity, rotation, weights, steps, beta, radius, law, scratch, out, error, tension):
+    """One flow step in len(steps) sub-steps, for every block.
+
+    state → out (B, 3N, LANES); newest, older: the (2, B, 3N, LANES) rate histories before and after it, filled as
+    [0] given, [1] written; velocity, rotation: three samples each; weights (sub-steps, STAGES, 3); steps: plan().
+    error (B, LANES): rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
+    """
+    count, rows = steps.shape[0], state.shape[1]
+    links = rows // 3 - 1
+    threads = scratch.shape[0]
+    for thread in prange(threads):
+        work = scratch[thread]
+        pivots, multipliers = work[: 2 * rows], work[2 * rows : 3 * rows]
+        flow, spin = work[3 * rows : 4 * rows], work[4 * rows : 5 * rows]
+        middle, rates = work[5 * rows : 6 * rows], work[6 * rows : 7 * rows]
+        for b in range(thread, state.shape[0], threads):
+            now, past, far = state[b], newest[0][b], older[0][b]
+            worst, pull = splat(0.0), splat(0.0)
+            for s in range(count):
+                h, start = steps[s, 0], steps[s, 7] == 1.0
+                if s == count - 1:
+                    w = newest[1][b]
+                elif s == count - 2:
+                    w = older[1][b]
+                else:
+                    ring = (7 + s % 3) * rows
+                    w = work[ring : ring + rows]
+                u, spins = _blend(velocity, b, weights[s, 0], flow), _blend(rotation, b, weights[s, 0], spin)
+                pull = link_rates(now, u, spins, load(beta, b), radius, law, pivots, multipliers, w)
+                total = splat(0.0)
+                if start:
+                    _turn_links(now, w, 0.5 * h, middle)
+                    u, spins = _blend(velocity, b, weights[s, 1], flow), _blend(rotation, b, weights[s, 1], spin)
+                    pull = link_rates(middle, u, spins, load(beta, b), radius, law, pivots, multipliers, rates)
+                    _turn_links(now, rates, h, out[b])
+                    for i in range(links):
+                        gap = scale(h, subtract(load3(rates, i), load3(w, i)))
+                        total = total + dot(gap, gap)
+                else:
+                    c0, c1, c2, magnus = steps[s, 0], steps[s, 1], steps[s, 2], steps[s, 3]
+                    d0, d1, d2 = steps[s, 4], steps[s, 5], steps[s, 6]
+                    for i in range(links):
+                        w0, w1, w2 = load3(w, i), load3(past, i), load3(far, i)
+                        angle = add_scaled(add_scaled(scale(c0, w0), c1, w1), c2, w2)
+                        angle = add_scaled(angle, magnus, cross(w0, w1))
+                        gap = add_scaled(add_scaled(scale(d0, w0), d1, w1), d2, w2)
+                        total = total + dot(gap, gap)
+                        store3(out[b], i, rotated(load3(now, i), angle))
+                    w0, w1, w2 = load3(w, links), load3(past, links), load3(far, links)
+                    move = add_scaled(add_scaled(scale(c0, w0), c1, w1), c2, w2)
+                    store3(out[b], links, add(load3(now, links), move))
+                worst = larger(total, worst)
+                now, past, far = out[b], w, past
+            store(error, b, sqrt((1.0 / links) * worst))
+            store(tension, b, sqrt(pull))

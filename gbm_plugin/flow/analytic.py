@@ -1,0 +1,76 @@
+"""Flows known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+NEEDS = ("velocity", "rotation", "gradient")
+
+
+def _checked(need: str) -> str:
+    if need not in NEEDS:
+        raise ValueError(f"need is {need!r}; allowed are {', '.join(NEEDS)}")
+    return need
+
+
+class LinearFlow:
+    """u(x) = velocity + gradient · x, steady; gradient[i, j] = du_i/dx_j. ValueError unless 3×3, 3, finite."""
+
+    def __init__(self, gradient, velocity=(0, 0, 0)):
+        self.gradient = np.array(gradient, dtype=float)
+        self.velocity = np.array(velocity, dtype=float)
+        if self.gradient.shape != (3, 3) or self.velocity.shape != (3,):
+            raise ValueError(
+                f"gradient and velocity have shapes {self.gradient.shape} and {self.velocity.shape}; "
+                "they must be (3, 3) and (3,)"
+            )
+        if not (np.isfinite(self.gradient).all() and np.isfinite(self.velocity).all()):
+            raise ValueError("gradient and velocity of a linear flow must be finite")
+        g = self.gradient
+        self._rotation = 0.5 * np.array([g[2, 1] - g[1, 2], g[0, 2] - g[2, 0], g[1, 0] - g[0, 1]])
+
+    def sample(self, positions, time, need="gradient"):
+        """Velocity (..., 3) at positions (..., 3), and what need asks for beside it.
+
+        need: "velocity" (extra is None), "rotation" (½∇×u, (..., 3)) or "gradient" ((..., 3, 3)).
+        """
+        positions = np.asarray(positions, dtype=float)
+        velocity = positions @ self.gradient.T + self.velocity
+        if _checked(need) == "velocity":
+            return velocity, None
+        extra = self._rotation if need == "rotation" else self.gradient
+        return velocity, np.broadcast_to(extra, positions.shape[:-1] + extra.shape)
+
+
+class TaylorGreen:
+    """Steady cellular flow in the plane (paper, eq. 12): U₀ (sin x̃ cos ỹ, −cos x̃ sin ỹ, 0), x̃ = πx/width.
+
+    ValueError unless width is positive and both numbers are finite. The compression rate at the stagnation
+    points is S = πU₀/width.
+    """
+
+    def __init__(self, width, velocity):
+        self.width, self.velocity = float(width), float(velocity)
+        if not (np.isfinite(self.width) and self.width > 0 and np.isfinite(self.velocity)):
+            raise ValueError(f"width is {width} and velocity {velocity}; width must be positive, both finite")
+
+    def sample(self, positions, time, need="gradient"):
+        """Velocity (..., 3) at positions (..., 3); extra as in LinearFlow.sample."""
+        positions = np.asarray(positions, dtype=float)
+        wavenumber = np.pi / self.width
+        x, y = wavenumber * positions[..., 0], wavenumber * positions[..., 1]
+        sin_x, cos_x, sin_y, cos_y = np.sin(x), np.cos(x), np.sin(y), np.cos(y)
+        velocity = np.zeros(positions.shape)
+        velocity[..., 0] = self.velocity * sin_x * cos_y
+        velocity[..., 1] = -self.velocity * cos_x * sin_y
+        if _checked(need) == "velocity":
+            return velocity, None
+        rate = self.velocity * wavenumber
+        if need == "rotation":
+            rotation = np.zeros(positions.shape)
+            rotation[..., 2] = rate * sin_x * sin_y
+            return velocity, rotation
+        gradient = np.zeros((*positions.shape, 3))
+        gradient[..., 0, 0], gradient[..., 0, 1] = rate * cos_x * cos_y, -rate * sin_x * sin_y
+        gradient[..., 1, 0], gradient[..., 1, 1] = rate * sin_x * sin_y, -rate * cos_x * cos_y
+        return velocity, gradient

@@ -1,0 +1,59 @@
+"""Reading the tables that OpenFOAM's function objects and options write."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .restarts import files_by_start, kept
+
+_ENTRY = re.compile(r"\(([^()]*)\)|([^\s()]+)")
+
+
+def read_dat(folder: Path | str, name: str) -> dict[str, NDArray[np.float64]]:
+    """Read ``<folder>/<start>/<name>`` of all starts as one table; later starts override repeated times.
+
+    folder: for example ``postProcessing/linearForcing``. Returns the columns by the names of the header line
+    (``# Time a b``): (S,) for numbers, (S, n) for entries in parentheses; "Time" is the first. An unfinished
+    last line is left out. Raises FileNotFoundError if there is no such file, ValueError for a file without
+    a header, a line that does not fit it, or parts with different columns.
+    """
+    files = files_by_start(folder, name)
+    if not files:
+        raise FileNotFoundError(f"no {name} in {folder}/<start time>/")
+    tables = [_read_one(file) for file in files]
+    for file, table in zip(files, tables, strict=True):
+        if list(table) != list(tables[0]):
+            raise ValueError(f"{file} has columns {', '.join(table)}; {files[0]} has {', '.join(tables[0])}")
+    tables = [table for table in tables if len(table["Time"])] or tables[-1:]
+    counts = kept([table["Time"] for table in tables])
+    return {
+        column: np.concatenate([table[column][:count] for table, count in zip(tables, counts, strict=True)])
+        for column in tables[0]
+    }
+
+
+def _read_one(file: Path) -> dict[str, NDArray[np.float64]]:
+    header, rows = None, []
+    lines = file.read_text().splitlines(keepends=True)
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("#"):
+            names = line[1:].split()
+            header = names if names[:1] == ["Time"] else header
+        elif line.strip() and header is not None:
+            entries = [vector.split() if word == "" else word for vector, word in _ENTRY.findall(line)]
+            unfinished = number == len(lines) and not line.endswith("\n")
+            if len(entries) == len(header) and not unfinished:
+                rows.append(entries)
+            elif not unfinished:
+                raise ValueError(f"{file}, line {number}: {len(entries)} entries for {len(header)} columns")
+    if header is None:
+        raise ValueError(f"{file} has no header line '# Time ...'")
+    try:
+        columns = [np.array([row[i] for row in rows], dtype=float) for i in range(len(header))]
+    except ValueError as error:
+        raise ValueError(f"{file} is not a table of numbers: {error}") from None
+    return dict(zip(header, columns, strict=True))

@@ -1,0 +1,194 @@
+"""Fiber recordings: written by Recorder, read by open_recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .recorder import SCHEMA_VERSION, FamilyRecord, Recorder
+from .restarts import files_by_start, kept
+from .transaction import Transaction
+
+__all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open_recording"]
+
+class Positions:
+    """Positions (S, F, N, 3) [m] of one family, read from the files when indexed; numpy's basic indexing."""
+
+    def __init__(self, parts: list[tuple[h5py.Dataset, int]]) -> None:
+        """parts: datasets in the order of time, and how many of the first records of each count."""
+        self._parts = parts
+        self._starts = np.cumsum([0] + [count for _, count in parts])
+        self.shape = (int(self._starts[-1]), *parts[0][0].shape[1:])
+        self.dtype = np.dtype(np.float64)
+        self.ndim = 4
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key) -> NDArray[np.float64]:
+        key = key if isinstance(key, tuple) else (key,)
+        if Ellipsis in key:
+            at = key.index(Ellipsis)
+            key = key[:at] + (slice(None),) * (self.ndim - len(key) + 1) + key[at + 1 :]
+        rows, rest = np.arange(len(self))[key[0]] if key else np.arange(len(self)), key[1:]
+        if np.ndim(rows) == 0:
+            part = int(np.searchsorted(self._starts, rows, side="right")) - 1
+            return self._parts[part][0][(int(rows - self._starts[part]), *rest)]
+        runs = np.split(rows, np.flatnonzero(np.diff(rows) != 1) + 1) if len(rows) else []
+        pieces = [
+            dataset[(slice(max(run[0] - start, 0), min(run[-1] + 1 - start, count)), *rest)]
+            for run in runs
+            for (dataset, count), start in zip(self._parts, self._starts[:-1], strict=True)
+            if run[0] < start + count and run[-1] >= start
+        ]
+        empty = np.empty((0, *np.empty((1, *self.shape[1:]))[(slice(None), *rest)].shape[1:]))
+        return np.concatenate(pieces) if pieces else empty
+
+    def __array__(self, dtype=None, copy=None) -> NDArray[np.float64]:
+        return np.asarray(self[:], dtype=dtype)
+
+
+@dataclass(frozen=True)
+class Family(FamilyRecord):
+    """A recorded family: its FamilyRecord and its positions (S, F, N, 3) [m]."""
+
+    positions: Positions = None
+
+
+class Recording:
+    """One run's fibers, read from one file or from the parts that its restarts wrote.
+
+    times (S,) [s]; steps (S,); families by name; box_origin, box_size (3,) [m]; metadata: schema_version,
+    program, program_version, viscosity [Pa s], density [kg/m³], dictionaries (text by file name).
+    Usable as a context manager; positions are read from the open files.
+    """
+
+    def __init__(self, parts: list[_Part]) -> None:
+        self._parts = parts
+        last = parts[-1]
+        counts = kept([part.times for part in parts])
+        self.paths = [part.path for part in parts]
+        self.times = np.concatenate([part.times[:count] for part, count in zip(parts, counts, strict=True)])
+        self.steps = np.concatenate([part.steps[:count] for part, count in zip(parts, counts, strict=True)])
+        self.box_origin = last.file["box_origin"][()]
+        self.box_size = last.file["box_size"][()]
+        self.metadata = last.metadata()
+        self.families = {
+            name: Family(
+                **vars(record),
+                positions=Positions(
+                    [
+                        (part.file[f"families/{name}/positions"], count)
+                        for part, count in zip(parts, counts, strict=True)
+                    ]
+                ),
+            )
+            for name, record in last.families.items()
+        }
+
+    def close(self) -> None:
+        for part in self._parts:
+            part.close()
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+
+class _Part:
+    """One open file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._changes = Transaction(path, writable=False)
+        try:
+            # a file that was left in the middle of a change is read through its journal
+            self.file = h5py.File(self._changes if self._changes.recovered else path, "r")
+        except OSError as error:
+            self._changes.close()
+            raise ValueError(f"{path} is not a fiber recording: {error}") from None
+        version = self.file.attrs.get("schema_version")
+        if version != SCHEMA_VERSION:
+            self.close()
+            raise ValueError(f"{path} has schema_version {version}; this program reads {SCHEMA_VERSION}")
+        self.times = self.file["time"][()]
+        self.steps = self.file["step"][()]
+        groups = sorted(self.file["families"].items(), key=lambda item: item[1].attrs["number"])
+        self.families = {name: self._family(name, group) for name, group in groups}
+
+    @staticmethod
+    def _family(name: str, group: h5py.Group) -> FamilyRecord:
+        _, count, beads, _ = group["positions"].shape
+        seed = group.attrs["seed"]
+        stiffness = group["bending_stiffness"][()]
+        return FamilyRecord(
+            name,
+            count,
+            beads,
+            float(group["radius"][()]),
+            float(stiffness) if np.ndim(stiffness) == 0 else stiffness,
+            None if isinstance(seed, h5py.Empty) else int(seed),
+            dict(group["model"].attrs),
+        )
+
+    def metadata(self) -> dict:
+        values = dict(self.file.attrs)
+        values["schema_version"] = int(values["schema_version"])
+        for name in ("viscosity", "density"):
+            values[name] = float(self.file[name][()])
+        texts = {}
+
+        def collect(name: str, node) -> None:
+            if isinstance(node, h5py.Dataset):
+                texts[name] = node.asstr()[()]
+
+        if "dictionaries" in self.file:
+            self.file["dictionaries"].visititems(collect)
+        values["dictionaries"] = texts
+        return values
+
+    def close(self) -> None:
+        self.file.close()
+        self._changes.close()
+
+
+def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
+    """Open a recording: one file, a folder ``postProcessing/fibers`` of a case, or a list of files.
+
+    The files of a list are the parts of one run; where their times overlap, the one that starts later counts.
+    Raises FileNotFoundError if there is none, ValueError if one is not a recording, has another schema
+    version, or holds other families than the rest.
+    """
+    paths = [paths] if isinstance(paths, (str, Path)) else list(paths)
+    files = []
+    for path in map(Path, paths):
+        files += files_by_start(path, "fibers.h5") if path.is_dir() else [path]
+    if not files:
+        raise FileNotFoundError(f"no fiber recording ({', '.join(map(str, paths)) or 'an empty list'})")
+    parts: list[_Part] = []
+    try:
+        for file in files:
+            parts.append(_Part(file))
+        first = parts[0]
+        for part in parts[1:]:
+            shapes = [{name: family.shape for name, family in p.families.items()} for p in (first, part)]
+            if shapes[0] != shapes[1]:
+                raise ValueError(
+                    f"{part.path} holds families {shapes[1]}, {first.path} {shapes[0]}: not one run"
+                )
+    except BaseException:
+        for part in parts:
+            part.close()
+        raise
+    filled = [part for part in parts if len(part.times)]
+    for part in parts:
+        if filled and part not in filled:
+            part.close()
+    return Recording(sorted(filled, key=lambda part: part.times[0]) or parts[-1:])

@@ -1,0 +1,37 @@
+"""A restarted run writes into one folder per start time; together they are one series."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+# A restart writes its start time again, in as many digits as OpenFOAM's time names have: records closer than
+# this fraction of the interval between records are the same one.
+_SAME_TIME = 1e-3
+
+
+def files_by_start(folder: Path | str, name: str) -> list[Path]:
+    """The files ``<folder>/<start time>/<name>``, by increasing start time."""
+    found = []
+    for file in Path(folder).glob(f"*/{name}"):
+        try:
+            found.append((float(file.parent.name), file))
+        except ValueError:
+            continue  # not a start time
+    return [file for _, file in sorted(found)]
+
+
+def kept(parts: Sequence[NDArray]) -> list[int]:
+    """How many of the first records of each part count, where later parts override what they repeat.
+
+    parts: the times of each part, in the order of their starts.
+    """
+    counts, limit = [], np.inf
+    for times in reversed(parts):
+        tolerance = _SAME_TIME * np.diff(times).min() if len(times) > 1 else 0.0
+        counts.append(int(np.searchsorted(times, limit - tolerance)))
+        limit = min(limit, times[0]) if len(times) else limit
+    return counts[::-1]
