@@ -2,7 +2,7 @@
 
 N samples of a stationary process with integral correlation time tau (in samples, tau = 1/2 + sum of the
 autocorrelation) carry N/(2 tau) independent values: the error of the mean is sigma (2 tau/N)^(1/2). tau is
-summed up to the first lag M >= 5 tau (Sokal 1997, "Monte Carlo methods in statistical mechanics", sec. 3): the
+summed to the first lag M >= 5 tau (Sokal 1997, "Monte Carlo methods in statistical mechanics", sec. 3): the
 bias of the cut is exp(-5) for an exponential correlation while the noise of the tail is left out.
 """
 
@@ -42,7 +42,7 @@ def autocorrelation(series: ArrayLike) -> NDArray:
 def integral_time(series: ArrayLike) -> float:
     """Integral correlation time 1/2 + sum_{l>=1} rho(l), in samples; 1/2 for white noise.
 
-    Raises ValueError when the series is shorter than 10 of its integral times: no error bar can be trusted then.
+    Raises ValueError when the series is shorter than 10 integral times: no error bar can be trusted then.
     """
     series = _checked(series)
     if np.ptp(series) <= 1e-13 * np.abs(series).max(initial=0.0):

@@ -70,7 +70,7 @@ def scales(k: NDArray, spectrum: NDArray, dissipation: float, viscosity: float) 
     """One-point energies and the length, time and Reynolds numbers of isotropic turbulence.
 
     kinetic_energy <|u|^2>/2; dissipation eps; velocity_rms u' = (2/3 k_fluctuation)^(1/2);
-    enstrophy eps/(2 nu) (= <|omega|^2>/2); taylor_length (15 nu u'^2/eps)^(1/2); taylor_reynolds u' lambda/nu;
+    enstrophy eps/(2 nu) = <|omega|^2>/2; taylor_length (15 nu u'^2/eps)^(1/2); taylor_reynolds u' lambda/nu;
     kolmogorov_length (nu^3/eps)^(1/4); kolmogorov_time (nu/eps)^(1/2);
     integral_length (pi/2u'^2) int E/k dk; dissipation_length u'^3/eps; turnover_time integral_length/u'.
     A fluid at rest has NaN for the ratios that it does not define.
