@@ -1,0 +1,124 @@
+r"""The Navier-Stokes operators on whole arrays: the equations as they are written, over NumPy or CuPy.
+
+With u in Fourier space, T_ij = u_i u_j - delta_ij u_z^2 (the trace goes into the pressure, five products
+remain) and P_ij = delta_ij - k_i k_j/k^2,
+
+    du_i/dt = P_ij [-i k_l T_jl + A u_j] - nu k^2 u_i.
+
+`Arrays` serves a GPU, and checks the slab-wise CPU operators that inherit from it (`slabs.py`).
+"""
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gbm_plugin.spectral.modes import Modes
+
+Array = Any  # numpy.ndarray or cupy.ndarray
+Term = tuple[float, float, Array]  # coefficient, delay, modes
+
+
+class Arrays:
+    """Operators on the Fourier-series coefficients of a vector field, complex (3, 2K+1, 2K+1, K+1)."""
+
+    def __init__(self, modes: Modes, viscosity: float, precision: str = "double", xp: ModuleType = np):
+        if precision not in ("double", "single"):
+            raise ValueError(f'precision must be "double" or "single", got "{precision}"')
+        if not 0 <= viscosity < np.inf:
+            raise ValueError(f"viscosity must be zero or positive, got {viscosity}")
+        self.modes, self.viscosity, self.xp = modes, float(viscosity), xp
+        self.real = np.dtype(np.float64 if precision == "double" else np.float32)
+        self.complex = np.dtype(np.complex128 if precision == "double" else np.complex64)
+        self.max_speed = None
+
+    def zeros(self) -> Array:
+        """Modes of a fluid at rest."""
+        return self.xp.zeros((3, *self.modes.shape), self.complex)
+
+    def wavenumbers(self) -> list[Array]:
+        """kx, ky, kz in the working precision, shaped to broadcast."""
+        return [self.xp.asarray(k, self.real) for k in self.modes.k]
+
+    def to_modes(self, fields: Array) -> Array:
+        """Truncated Fourier coefficients (m, 2K+1, 2K+1, K+1) of real fields (m, n, n, n)."""
+        cut, out = self.modes.cut, self.xp.empty((len(fields), *self.modes.shape), self.complex)
+        for field, target in zip(fields, out, strict=True):
+            full = self.xp.fft.rfftn(self.xp.asarray(field, self.real), norm="forward")
+            for stored, place in self.modes.blocks():
+                target[stored] = full[place][..., : cut + 1]
+        return out
+
+    def to_physical(self, modes: Array) -> Array:
+        """Real fields (m, n, n, n) at the nodes, from modes (m, 2K+1, 2K+1, K+1)."""
+        n, cut = self.modes.cells, self.modes.cut
+        out = self.xp.empty((len(modes), n, n, n), self.real)
+        for source, target in zip(modes, out, strict=True):
+            full = self.xp.zeros((n, n, n // 2 + 1), self.complex)
+            for stored, place in self.modes.blocks():
+                full[place][..., : cut + 1] = source[stored]
+            target[:] = self.xp.fft.irfftn(full, s=(n, n, n), norm="forward")
+        return out
+
+    def project(self, f: Array) -> Array:
+        """The solenoidal part of f without its mean: P f."""
+        kx, ky, kz = self.wavenumbers()
+        k_squared = kx**2 + ky**2 + kz**2
+        k_squared[0, 0, 0] = 1
+        q = (kx * f[0] + ky * f[1] + kz * f[2]) / k_squared
+        out = self.xp.stack([f[0] - kx * q, f[1] - ky * q, f[2] - kz * q])
+        out[:, 0, 0, 0] = 0
+        return out
+
+    def nonlinear(self, u: Array, out: Array, linear: float = 0.0, want_speed: bool = False) -> None:
+        """out = P [-div(u u) + linear u]; on request also max_speed = max(|u_x| + |u_y| + |u_z|)."""
+        x, y, z = self.to_physical(u)
+        if want_speed:
+            self.max_speed = float((abs(x) + abs(y) + abs(z)).max())
+        kx, ky, kz = self.wavenumbers()
+        xx, yy, xy, xz, yz = self.to_modes([x * x - z * z, y * y - z * z, x * y, x * z, y * z])
+        divergence = self.xp.stack(
+            [kx * xx + ky * xy + kz * xz, kx * xy + ky * yy + kz * yz, kx * xz + ky * yz]
+        )
+        out[:] = self.project(self.real.type(linear) * u - 1j * divergence)
+
+    def combine(self, out: Array, terms: list[Term]) -> float:
+        """out = sum of coefficient exp(-nu k^2 delay) modes over the terms; returns its fluctuation energy."""
+        k_squared = self.xp.asarray(self.modes.k_squared)
+        total = sum(
+            (c * self.xp.exp(-self.viscosity * k_squared * t)).astype(self.real) * a for c, t, a in terms
+        )
+        out[:] = total
+        return self.energy(out)
+
+    def energy(self, u: Array) -> float:
+        """Kinetic energy of the fluctuations, <|u - <u>|^2>/2."""
+        return float(self.mode_energy(u).ravel()[1:].sum())
+
+    def mode_energy(self, u: Array) -> Array:
+        """Energy of each stored mode together with its conjugate, in double precision."""
+        squares = (u.real.astype(np.float64) ** 2 + u.imag.astype(np.float64) ** 2).sum(axis=0)
+        return 0.5 * squares * self.xp.asarray(self.modes.weights)
+
+    def close(self, u: Array) -> None:
+        """Restore c(-k) = conj c(k) where both are stored, at kz = 0: rounding would let them part."""
+        cut = self.modes.cut
+        plane = u[..., 0]
+        plane[:, 0, 0] = plane[:, 0, 0].real
+        plane[:, 0, cut + 1 :] = plane[:, 0, cut:0:-1].conj()
+        plane[:, cut + 1 :, 0] = plane[:, cut:0:-1, 0].conj()
+        plane[:, cut + 1 :, 1:] = plane[:, cut:0:-1, :0:-1].conj()
+
+    def derivative(self, u: Array, axis: int) -> Array:
+        """Modes of du/dx_axis."""
+        return 1j * self.wavenumbers()[axis] * u
+
+    def curl(self, u: Array) -> Array:
+        """Modes of the curl of u."""
+        kx, ky, kz = self.wavenumbers()
+        return 1j * self.xp.stack([ky * u[2] - kz * u[1], kz * u[0] - kx * u[2], kx * u[1] - ky * u[0]])
+
+    def host(self, a: Array) -> NDArray:
+        """The array in main memory."""
+        return a.get() if hasattr(a, "get") else a

@@ -1,0 +1,183 @@
+"""The operators on a CPU, plane by plane, so that physical space never leaves the cache.
+
+A field is transformed along x first, for the stored (ky, kz) only. Then plane pairs (x, x + 1), as the real
+and the imaginary part of one complex plane, go to physical space in y and z, are multiplied point by point,
+and come back: three inverse and five forward transforms in a buffer of a few hundred kilobytes. Modes beyond
+the truncation are neither transformed nor stored. Complex transforms of two real planes cost less than real
+ones (FFTW's real codelets are not vectorised), and FFTW's estimated plans are as fast here as measured ones:
+a plan does not depend on timings, so the same input gives the same bits in every run, with any number of
+threads.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pyfftw
+
+from gbm_plugin.spectral import kernels
+from gbm_plugin.spectral.arrays import Arrays, Term
+from gbm_plugin.spectral.modes import Modes
+
+BLOCK = 1 << 20  # bytes of plane buffers that one thread works on
+
+
+class Slabs(Arrays):
+    """`Arrays` with the costly operators replaced by threaded, fused, pruned ones."""
+
+    def __init__(self, modes: Modes, viscosity: float, precision: str = "double", threads: int = 1):
+        super().__init__(modes, viscosity, precision)
+        if threads != int(threads) or threads < 1:
+            raise ValueError(f"threads must be a positive number, got {threads}")
+        self.threads = int(threads)
+        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        n, cut = modes.cells, modes.cut
+        self._mixed = np.empty((5, n, 2 * cut + 1, cut + 1), self.complex)
+        self._workers = [_Worker(modes, self.complex, self.real) for _ in range(self.threads)]
+        self._k = [k.ravel().astype(self.real) for k in modes.k]
+        self._rows = modes.rows
+
+    def nonlinear(self, u, out, linear=0.0, want_speed=False):
+        n, mixed, scale = self.modes.cells, self._mixed, self.real.type(1 / self.modes.cells**3)
+        kx, ky, kz = self._k
+        linear = self.real.type(linear)
+        speeds = [0.0] * self.threads
+
+        def multiply(worker, first, planes):
+            kernels.pack(mixed, first, planes, self._rows)
+            worker.inverse(len(planes))
+            view = planes.view(self.real)
+            if want_speed:
+                speed = kernels.max_speed(view, 2 * n)
+                speeds[self._workers.index(worker)] = max(speeds[self._workers.index(worker)], speed)
+            kernels.products(view, 2 * n)
+            worker.forward(len(planes))
+            kernels.unpack(planes, mixed, first, self._rows, scale)
+
+        def finish(worker, j):
+            worker.columns[:] = mixed[:, :, j]
+            worker.forward_x.execute()
+            kernels.project(worker.columns, u[:, :, j], out[:, :, j], self._rows, kx, ky[j], kz, linear)
+
+        self._to_mixed(u)
+        self._each_block(multiply)
+        self._share(lambda worker, start, stop: [finish(worker, j) for j in range(start, stop)], len(ky))
+        self.max_speed = max(speeds) if want_speed else None
+
+    def to_physical(self, modes):
+        n = self.modes.cells
+        out = np.empty((len(modes), n, n, n), self.real)
+        for first in range(0, len(modes), 3):
+            part = out[first : first + 3]
+            fields = np.zeros((3, *self.modes.shape), self.complex)
+            fields[: len(part)] = modes[first : first + 3]
+
+            def unload(worker, first, planes, part=part):
+                kernels.pack(self._mixed, first, planes, self._rows)
+                worker.inverse(len(planes))
+                for pair, plane in enumerate(planes):
+                    part[:, first + 2 * pair] = plane[: len(part), :, :n].real
+                    part[:, first + 2 * pair + 1] = plane[: len(part), :, :n].imag
+
+            self._to_mixed(fields)
+            self._each_block(unload)
+        return out
+
+    def combine(self, out: np.ndarray, terms: list[Term]) -> float:
+        axes = [k.astype(float) ** 2 for k in self._k]
+        axes[2] = np.repeat(axes[2], 2)  # real and imaginary part
+        factors = [
+            np.array(
+                [(c if axis == 0 else 1) * np.exp(-self.viscosity * k2 * delay) for c, delay, _ in terms]
+            )
+            for axis, k2 in enumerate(axes)
+        ]
+        fx, fy, fz = (f.astype(self.real) for f in factors)
+        arrays = tuple(array.view(self.real) for *_, array in terms)
+        weights = np.repeat(self.modes.weights, 2)
+        energy = np.empty(len(axes[0]))
+
+        def part(worker, start, stop):
+            row = np.empty(fz.shape[1], self.real)
+            kernels.combine(out.view(self.real), arrays, fx, fy, fz, weights, row, energy, start, stop)
+
+        self._share(part, len(energy))
+        mean = out[:, 0, 0, 0].astype(complex)
+        return 0.5 * float(energy.sum() - (mean * mean.conj()).real.sum())
+
+    def _to_mixed(self, u: np.ndarray) -> None:
+        """Points in x, modes in y and z, of three fields."""
+        cut, mixed = self.modes.cut, self._mixed
+
+        def column(worker, j):
+            buffer = worker.columns[:3]
+            buffer[:, : cut + 1] = u[:, : cut + 1, j]
+            buffer[:, cut + 1 : -cut] = 0
+            buffer[:, -cut:] = u[:, cut + 1 :, j]
+            worker.inverse_x.execute()
+            mixed[:3, :, j] = buffer
+
+        self._share(lambda worker, start, stop: [column(worker, j) for j in range(start, stop)], 2 * cut + 1)
+
+    def _each_block(self, work: Callable) -> None:
+        """work(worker, first plane, its plane buffers) for all blocks of plane pairs."""
+        pairs = self.modes.cells // 2
+
+        def blocks(worker, start, stop):
+            for pair in range(start, stop, len(worker.planes)):
+                work(worker, 2 * pair, worker.planes[: min(len(worker.planes), stop - pair)])
+
+        self._share(blocks, pairs)
+
+    def _share(self, work: Callable, count: int) -> None:
+        """work(worker, start, stop) over equal shares of range(count), one per thread."""
+        bounds = np.linspace(0, count, self.threads + 1).astype(int).tolist()
+        calls = list(zip(self._workers, bounds[:-1], bounds[1:], strict=True))
+        if self._pool is None:
+            work(*calls[0])
+        else:
+            for future in [self._pool.submit(work, *call) for call in calls]:
+                future.result()
+
+
+class _Worker:
+    """Buffers and plans of one thread."""
+
+    def __init__(self, modes: Modes, kind: np.dtype, real: np.dtype):
+        n, cut = modes.cells, modes.cut
+        width = n + 64 // kind.itemsize  # rows a power of two apart would fight for the same cache lines
+        pairs = min(n // 2, max(1, BLOCK // (5 * n * width * kind.itemsize)))
+        self.columns = pyfftw.zeros_aligned((5, n, cut + 1), kind)
+        self.planes = pyfftw.zeros_aligned((pairs, 5, n, width), kind)
+        self.inverse_x = _plan(self.columns[:3], 1, "FFTW_BACKWARD")
+        self.forward_x = _plan(self.columns, 1, "FFTW_FORWARD")
+        self._plans: dict[int, tuple[list, list]] = {}
+        self._cut, self._n = cut, n
+
+    def _for(self, pairs: int) -> tuple[list, list]:
+        if pairs not in self._plans:
+            z, n, cut = self.planes[:pairs, ..., : self._n], self._n, self._cut
+            edges = (slice(0, cut + 1), slice(n - cut, n))  # the kz that are kept
+
+            def along(fields, direction):
+                part = z[:, :fields]
+                return [_plan(part[..., e], 2, direction) for e in edges], _plan(part, 3, direction)
+
+            y, rows = along(3, "FFTW_BACKWARD")
+            inverse = [*y, rows]
+            y, rows = along(5, "FFTW_FORWARD")
+            self._plans[pairs] = inverse, [rows, *y]
+        return self._plans[pairs]
+
+    def inverse(self, pairs: int) -> None:
+        for plan in self._for(pairs)[0]:
+            plan.execute()
+
+    def forward(self, pairs: int) -> None:
+        for plan in self._for(pairs)[1]:
+            plan.execute()
+
+
+def _plan(array: np.ndarray, axis: int, direction: str) -> pyfftw.FFTW:
+    """In-place complex transform along one axis, not normalised."""
+    return pyfftw.FFTW(array, array, axes=(axis,), direction=direction, flags=("FFTW_ESTIMATE",))

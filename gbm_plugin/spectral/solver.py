@@ -1,0 +1,259 @@
+"""The pseudo-spectral Navier-Stokes solver of the periodic box."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gbm_plugin.spectral import interpolation as interpolate
+from gbm_plugin.spectral.arrays import Array, Arrays
+from gbm_plugin.spectral.forcing import Forcing
+from gbm_plugin.spectral.modes import Modes
+from gbm_plugin.spectral.slabs import Slabs
+from gbm_plugin.spectral.stepping import AdamsBashforth3, RungeKutta4
+from gbm_plugin.statistics import turbulence
+
+SCHEMES = {"ab3": AdamsBashforth3, "rk4": RungeKutta4}
+NEEDS = ("velocity", "rotation", "gradient")
+
+
+class SpectralSolver:
+    """du/dt + u.grad u = -grad p + nu lap u + f, div u = 0 in a periodic cube, with 2/3 dealiasing.
+
+    cells: even number n of nodes per edge, at x_i = i box/n; viscosity: kinematic, nu; box: edge length;
+    forcing: None, `LinearForcing` or `EswaranPope`.
+    Either time_step (fixed) or cfl is given; with cfl the step is cfl h/max(|u_x| + |u_y| + |u_z|), h =
+    box/n, chosen anew in every step (AB3 is stable below 0.34, RK4 below 1.35).
+    scheme: "ab3" (third order, the paper's) or "rk4"; precision: "double" or "single"; threads: of the CPU;
+    interpolation: "trilinear" (the paper's), "cubic" or "exact", for `sample`; device: "cpu" or "gpu" (needs
+    CuPy).
+
+    The fluid starts at rest at time 0. Raises ValueError for a bad value, FloatingPointError when the
+    velocity becomes infinite or NaN.
+    """
+
+    def __init__(
+        self,
+        cells: int,
+        viscosity: float,
+        box: float = 2 * np.pi,
+        forcing: Forcing | None = None,
+        time_step: float | None = None,
+        *,
+        cfl: float | None = None,
+        scheme: str = "ab3",
+        threads: int = 1,
+        precision: str = "double",
+        interpolation: str = "trilinear",
+        device: str = "cpu",
+    ):
+        if (time_step is None) == (cfl is None):
+            raise ValueError("SpectralSolver takes exactly one of time_step and cfl")
+        for name, value in (("time_step", time_step), ("cfl", cfl)):
+            if value is not None and not 0 < value < np.inf:
+                raise ValueError(f"{name} must be positive, got {value}")
+        _one_of("scheme", scheme, SCHEMES)
+        _one_of("interpolation", interpolation, interpolate.WORDS)
+        self.modes = Modes(cells, box)
+        self.operators = _operators(device, self.modes, viscosity, precision, threads)
+        self.forcing = Forcing() if forcing is None else forcing
+        self.forcing.bind(self.operators)
+        self.interpolation = interpolation
+        self.time, self.step = 0.0, 0
+        self.time_step, self.cfl = time_step, cfl
+        self._threads = threads
+        self._stepper = SCHEMES[scheme](self.operators)
+        self._u = self.operators.zeros()
+        self._energy = 0.0
+        self._fields: dict[str, Array] = {}  # physical fields of the present time
+
+    cells = property(lambda self: self.modes.cells, doc="Nodes per edge.")
+    box = property(lambda self: self.modes.box, doc="Edge length.")
+    viscosity = property(lambda self: self.operators.viscosity, doc="Kinematic viscosity.")
+
+    def set_velocity(self, u: ArrayLike) -> None:
+        """Set the velocity from node values (3, n, n, n): its mean and its solenoidal, resolved part."""
+        u = np.asarray(u)
+        n = self.cells
+        if u.shape != (3, n, n, n):
+            raise ValueError(f"velocity must have shape (3, {n}, {n}, {n}), got {u.shape}")
+        if not np.isfinite(u).all():
+            raise ValueError("velocity must be finite everywhere")
+        modes = self.operators.to_modes(u)
+        self._u = self.operators.project(modes)
+        self._u[:, 0, 0, 0] = modes[:, 0, 0, 0].real
+        self.operators.close(self._u)
+        self._energy = self.operators.energy(self._u)
+        self._stepper.forget()
+        self._fields.clear()
+
+    @property
+    def velocity(self) -> NDArray:
+        """Velocity at the nodes, (3, n, n, n), [c, i, j, k] at (i, j, k) box/n."""
+        return self.operators.host(self._physical("velocity", lambda: self._u)).copy()
+
+    @property
+    def coefficients(self) -> NDArray:
+        """Fourier coefficients of the velocity, (3, 2K+1, 2K+1, K+1), ordered as `Modes` says."""
+        return self.operators.host(self._u).copy()
+
+    def advance(self, steps: int = 1) -> None:
+        """Take time steps."""
+        for _ in range(steps):
+            h, self._energy = self._stepper.step(
+                self._u, self._energy, self.time, self._evaluate, self._choose
+            )
+            self.operators.close(self._u)
+            self.forcing.advance(h)
+            self.time += h
+            self.step += 1
+            self._fields.clear()
+            if not np.isfinite(self._energy):
+                reason = (
+                    f"velocity is not finite after step {self.step}, t = {self.time:.6g}, time step {h:.3g}"
+                )
+                raise FloatingPointError(
+                    f"{reason}: the step is too long for this flow, or the forcing too strong"
+                )
+
+    def spectrum(self) -> tuple[NDArray, NDArray]:
+        """k (S,) and E(k) (S,), eq. (16) of the paper; see `statistics.turbulence.energy_spectrum`."""
+        energy = self.operators.host(self.operators.mode_energy(self._u))
+        return turbulence.shell_spectrum(energy, self.modes.k, self.modes.k0)
+
+    def statistics(self) -> dict[str, float]:
+        """Energies, scales and gradient moments at the present time, by `statistics.turbulence`.
+
+        kinetic_energy, dissipation, velocity_rms, enstrophy, taylor_length, taylor_reynolds,
+        kolmogorov_length, kolmogorov_time, integral_length, dissipation_length (u'^3/eps), turnover_time,
+        velocity_skewness, velocity_flatness, and power = <u.f>.
+        """
+        operators, u = self.operators, self._u
+        slopes = operators.xp.stack([operators.derivative(u[i], i) for i in range(3)])
+        return (
+            turbulence.scales(*self.spectrum(), self._dissipation(), self.viscosity)
+            | turbulence.gradient_moments(operators.host(operators.to_physical(slopes)))
+            | {"power": self.forcing.power(u, self._energy)}
+        )
+
+    def energy_budget(self) -> dict[str, float]:
+        """rate = d<|u|^2>/2dt = power + transfer - dissipation; transfer (nonlinear) vanishes to rounding."""
+        slope = self.operators.zeros()
+        self._evaluate(self._u, slope, self._energy)
+        a, b = self.operators.host(self._u).astype(complex), self.operators.host(slope)
+        gain = float(((a * b.conj()).real * self.modes.weights).sum())
+        power, dissipation = self.forcing.power(self._u, self._energy), self._dissipation()
+        return {
+            "power": power,
+            "dissipation": dissipation,
+            "transfer": gain - power,
+            "rate": gain - dissipation,
+        }
+
+    def sample(
+        self, positions: ArrayLike, time: float, need: str = "gradient"
+    ) -> tuple[NDArray, NDArray | None]:
+        """Velocity (..., 3) at positions (..., 3), and what `need` asks for beside it.
+
+        need: "velocity" (nothing more), "rotation" (half the vorticity, (..., 3)) or "gradient" ((..., 3, 3),
+        [..., i, j] = du_i/dx_j). The flow is advanced to a later time by whole steps; a time in between, or
+        past, is a ValueError. Derivatives are spectrally exact at the nodes and interpolated as the velocity
+        is.
+        """
+        _one_of("need", need, NEEDS)
+        points = np.ascontiguousarray(positions, float)
+        if points.shape[-1:] != (3,):
+            raise ValueError(f"positions must have shape (..., 3), got {points.shape}")
+        if not np.isfinite(points).all():
+            raise ValueError("positions must be finite")
+        self._reach(time)
+        flat, shape, operators, u = points.reshape(-1, 3), points.shape[:-1], self.operators, self._u
+        velocity = self._at(flat, "velocity", lambda: u).reshape(*shape, 3)
+        if need == "velocity":
+            return velocity, None
+        if need == "rotation":
+            return velocity, self._at(flat, need, lambda: operators.curl(u) / 2).reshape(*shape, 3)
+        columns = [self._at(flat, f"gradient {j}", lambda j=j: operators.derivative(u, j)) for j in range(3)]
+        return velocity, np.stack(columns, axis=-1).reshape(*shape, 3, 3)
+
+    def state(self) -> dict[str, NDArray | float]:
+        """All that `restore` needs to continue to the same bits: arrays and floats by name."""
+        own = {
+            "coefficients": self.coefficients,
+            "energy": self._energy,
+            "time": self.time,
+            "step": float(self.step),
+        }
+        forcing = {f"forcing_{name}": value for name, value in self.forcing.state().items()}
+        return own | self._stepper.state() | forcing
+
+    def restore(self, state: dict[str, NDArray | float]) -> None:
+        """Continue from the `state()` of a solver that was built from the same values."""
+        coefficients = np.asarray(state["coefficients"])
+        if coefficients.shape != self._u.shape or coefficients.dtype != self._u.dtype:
+            stored, own = (f"{a.dtype}{a.shape}" for a in (coefficients, self._u))
+            raise ValueError(
+                f"the stored velocity is {stored}, this solver's {own}: cells and precision must agree"
+            )
+        self._u = self.operators.xp.array(coefficients)
+        self._energy, self.time, self.step = float(state["energy"]), float(state["time"]), int(state["step"])
+        self._stepper.restore(state)
+        prefix = "forcing_"
+        self.forcing.restore({k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)})
+        self._fields.clear()
+
+    def _evaluate(self, u: Array, out: Array, energy: float) -> None:
+        """du/dt without viscosity."""
+        linear = self.forcing.coefficient(energy)
+        self.operators.nonlinear(u, out, linear, want_speed=self.cfl is not None)
+        self.forcing.add(out)
+
+    def _choose(self) -> float:
+        """The length of the step that begins, the velocity at its start having been seen."""
+        if self.cfl is None:
+            return self.time_step
+        speed = self.operators.max_speed
+        if not speed > 0:
+            raise ValueError("a time step cannot be chosen by cfl in a fluid at rest: set a velocity first")
+        return self.cfl * self.box / self.cells / speed
+
+    def _dissipation(self) -> float:
+        energy = self.operators.host(self.operators.mode_energy(self._u))
+        return 2 * self.viscosity * float((self.modes.k_squared * energy).sum())
+
+    def _reach(self, time: float) -> None:
+        """Advance by whole steps until `time`."""
+        slack = 1e-6 * (self.time_step or 0.0)
+        while self.time < time - slack:
+            self.advance()
+        if abs(self.time - time) > max(slack, 1e-12 * abs(time)):
+            raise ValueError(f"the flow is known at t = {self.time:.10g}, not at t = {time:.10g}")
+
+    def _physical(self, name: str, modes) -> Array:
+        """The fields at the nodes, computed once per time."""
+        if name not in self._fields:
+            self._fields[name] = self.operators.to_physical(modes())
+        return self._fields[name]
+
+    def _at(self, points: NDArray, name: str, modes) -> NDArray:
+        """Three fields at points (P, 3): (P, 3)."""
+        if self.interpolation == "exact":
+            return interpolate.fourier_sum(self.operators.host(modes()), points, self.box, self._threads)
+        fields = self.operators.host(self._physical(name, modes))
+        return interpolate.on_grid(self.interpolation, fields, points, self.box)
+
+
+def _operators(device: str, modes: Modes, viscosity: float, precision: str, threads: int) -> Arrays:
+    _one_of("device", device, ("cpu", "gpu"))
+    if device == "cpu":
+        return Slabs(modes, viscosity, precision, threads)
+    try:
+        import cupy
+
+        cupy.cuda.runtime.getDeviceCount()
+    except Exception as error:  # CuPy raises its own kinds for a missing driver or device
+        raise ValueError(f'device "gpu" needs CuPy and a CUDA device: {str(error).splitlines()[0]}') from None
+    return Arrays(modes, viscosity, precision, cupy)
+
+
+def _one_of(name: str, word: str, allowed) -> None:
+    if word not in allowed:
+        raise ValueError(f'{name} must be one of {", ".join(allowed)}, got "{word}"')
