@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from PyFoam.Basics.DataStructures import BoolProxy, DictProxy
+from PyFoam.Basics.DataStructures import BoolProxy
 from PyFoam.Error import PyFoamException
 from PyFoam.RunDictionary.ParsedParameterFile import ParsedParameterFile, PyFoamParserError
+
+from .macros import MacroError, expand
 
 _REQUIRED: Any = object()
 
@@ -36,8 +38,8 @@ class Dictionary:
         if not path.is_file():
             raise CaseError(f"there is no file {path}")
         try:
-            entries = ParsedParameterFile(str(path), doMacroExpansion=True).content
-        except (PyFoamParserError, PyFoamException, UnicodeDecodeError) as error:
+            entries = expand(ParsedParameterFile(str(path)).content)
+        except (PyFoamParserError, PyFoamException, MacroError, UnicodeDecodeError) as error:
             raise CaseError(f"{path} is not an OpenFOAM dictionary: {error}") from None
         return cls(entries, str(path))
 
@@ -121,7 +123,7 @@ class Dictionary:
     def sub(self, name: str, default: Any = _REQUIRED) -> Dictionary:
         """The dictionary `name` inside this one."""
         value = self._get(name, default)
-        if not isinstance(value, (dict, DictProxy)):
+        if not isinstance(value, dict):
             raise self.fail(name, f"is '{value}': a dictionary in braces is needed")
         return Dictionary(value, f"{self.where}, {name}")
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from ..case.scene import Family, Scene
 from ..fiber import Fibers, Stepper
+from ..case.times import STATE_FILE
 from .message import NEEDS
-
-STATE_FILE = "uniform/fibers.npz"
 
 
 class Fleet:
@@ -38,19 +37,11 @@ class Fleet:
         size = np.subtract(box_max, box_min)
         steppers = []
         for f in scene.families:
-            fibers = Fibers.straight(
-                f.count,
-                f.beads,
-                f.length,
-                f.bending_stiffness,
-                scene.dynamic_viscosity,
-                box=size,
-                seed=f.seed,
-                bending_torque=f.model.bending_torque,
-                curvature_law=f.model.curvature_law,
-            )
+            words = {"bending_torque": f.model.bending_torque, "curvature_law": f.model.curvature_law}
+            made_of = (f.bending_stiffness, scene.dynamic_viscosity)
+            fibers = Fibers.straight(f.count, f.beads, f.length, *made_of, box=size, seed=f.seed, **words)
             if np.any(box_min):
-                fibers = fibers.shifted(box_min)
+                fibers = Fibers(fibers.positions + box_min, *made_of, **words)
             steppers.append(
                 Stepper(
                     fibers,
@@ -62,6 +53,10 @@ class Fleet:
                 )
             )
         return cls(scene.families, steppers)
+
+    @property
+    def time(self) -> float:
+        return self.steppers[0].time
 
     @property
     def need(self) -> str:

@@ -16,6 +16,23 @@ namespace functionObjects
 namespace
 {
 
+//- While one exists, an error ends the run. Function objects' errors are
+//  otherwise warnings, and the flow would go on without its fibers.
+class fatalErrors
+{
+    const bool error_ = Foam::FatalError.throwExceptions(false);
+    const bool ioError_ = Foam::FatalIOError.throwExceptions(false);
+
+public:
+
+    ~fatalErrors()
+    {
+        Foam::FatalError.throwExceptions(error_);
+        Foam::FatalIOError.throwExceptions(ioError_);
+    }
+};
+
+
 //- Seconds since the last call
 class stopwatch
 {
@@ -58,6 +75,8 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
     beads_(0),
     ambient_(NOTHING)
 {
+    const fatalErrors guard;
+
     read(dict);
 
     if (postProcess)
@@ -141,8 +160,8 @@ void Foam::functionObjects::fiberCoupling::shakeHands
         hello.append(cells);
         const std::string folder(timeFolder());
         hello.append<std::int64_t>(folder.size());
-        hello.append(folder);
-        hello.append(daemon_->token());
+        hello.appendText(folder);
+        hello.appendText(daemon_->token());
         daemon_->send(hello);
 
         const message welcome(daemon_->receive(message::WELCOME, step_));
@@ -310,7 +329,7 @@ void Foam::functionObjects::fiberCoupling::sendSample
         if (time_.writeTime() && !provisional)
         {
             message save(message::SAVE, step_, time_.value());
-            save.append(timeFolder());
+            save.appendText(timeFolder());
             daemon_->send(save);
         }
         daemon_->send(sample);
@@ -403,6 +422,8 @@ bool Foam::functionObjects::fiberCoupling::read(const dictionary& dict)
 
 bool Foam::functionObjects::fiberCoupling::execute()
 {
+    const fatalErrors guard;
+
     if (postProcess || time_.timeIndex() == step_)
     {
         return true;    // executed again at the end of the run
@@ -433,6 +454,8 @@ bool Foam::functionObjects::fiberCoupling::execute()
 
 bool Foam::functionObjects::fiberCoupling::end()
 {
+    const fatalErrors guard;
+
     if (daemon_.valid())
     {
         daemon_->send(message(message::END, step_, time_.value()));

@@ -36,6 +36,7 @@ Foam::fv::linearForcing::linearForcing
 :
     option(name, modelType, dict, mesh),
     writeFile(mesh, name, name),
+    nu_(0),
     timeIndex_(-1),
     A_(0),
     hasOld_(false)
@@ -185,7 +186,6 @@ void Foam::fv::linearForcing::writeRow
     const flowStatistics& s
 )
 {
-    const scalar nu = kinematicViscosity(mesh_);
     const scalar power = 2*s.k*coefficient(s.k);
     const scalar uPrime = Foam::sqrt(2*s.k/3);
     const scalar epsilon = max(s.epsilonLaplacian, VSMALL);
@@ -205,8 +205,8 @@ void Foam::fv::linearForcing::writeRow
             << token::TAB << s.epsilonGradient
             << token::TAB << s.epsilonLaplacian
             << token::TAB << uPrime
-            << token::TAB << Foam::sqrt(15*nu/epsilon)*sqr(uPrime)/nu
-            << token::TAB << Foam::pow025(pow3(nu)/epsilon)
+            << token::TAB << Foam::sqrt(15/(nu_*epsilon))*sqr(uPrime)
+            << token::TAB << Foam::pow025(pow3(nu_)/epsilon)
             << token::TAB << coefficient(s.k)
             << token::TAB << power
             << token::TAB << s.mean.x()
@@ -220,7 +220,8 @@ void Foam::fv::linearForcing::writeRow
 void Foam::fv::linearForcing::beginStep(const volVectorField& U)
 {
     const scalar deltaT = mesh_.time().deltaTValue();
-    const flowStatistics now(U, kinematicViscosity(mesh_));
+    nu_ = kinematicViscosity(mesh_);
+    const flowStatistics now(U, nu_);
 
     if (!std::isfinite(now.k))
     {
@@ -308,6 +309,6 @@ void Foam::fv::linearForcing::correct(volVectorField& U)
     if (time.value() > time.endTime().value() - 0.5*time.deltaTValue())
     {
         rowTime_ = time.value();
-        row_.reset(new flowStatistics(U, kinematicViscosity(mesh_)));
+        row_.reset(new flowStatistics(U, nu_));
     }
 }

@@ -1,0 +1,81 @@
+"""OpenFOAM's programs: their environment, their commands, and what their logs say went wrong."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+from .dictionary import CaseError
+
+DEBIAN = Path("/usr/share/openfoam")
+PLUGIN = "libgbmPlugin.so"
+
+
+def environment() -> dict[str, str]:
+    """Variables for OpenFOAM's programs: a sourced OpenFOAM as it is, else Debian's package.
+
+    CaseError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
+    """
+    env = dict(os.environ)
+    if "WM_PROJECT_DIR" not in env:
+        if not (DEBIAN / "etc").is_dir():
+            raise CaseError(
+                "OpenFOAM is not installed (Debian: the package openfoam), nor is one sourced: run ./Allrun"
+            )
+        env |= {"WM_PROJECT_DIR": str(DEBIAN), "WM_PROJECT_VERSION": "v1912"}
+    version = env.get("WM_PROJECT_VERSION", "v1912")
+    if not re.fullmatch(r"v(19[12]\d|2\d\d\d)", version):
+        raise CaseError(
+            f"OpenFOAM '{version}' is not supported: openfoam.com v1912 or later is needed "
+            "(www.openfoam.com names its releases vYYMM)"
+        )
+    own = Path(__file__).resolve().parents[2] / "build/lib"
+    folders = [Path(env["FOAM_USER_LIBBIN"])] if "FOAM_USER_LIBBIN" in env else []
+    library = next((f for f in [*folders, own] if (f / PLUGIN).is_file()), None)
+    if library is None:
+        raise CaseError(f"the plugin {PLUGIN} is not in {[*folders, own][0]}: build it with ./Allwmake")
+    env["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, [str(library), env.get("LD_LIBRARY_PATH", "")]))
+    env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return env
+
+
+def command(program: str, case: Path, ranks: int = 1) -> list[str]:
+    """argv of a program on a case, on this many MPI ranks."""
+    if shutil.which(program) is None:
+        raise CaseError(f"the OpenFOAM program '{program}' is not on the PATH")
+    argv = [program, "-case", str(case)]
+    if ranks > 1:
+        argv = ["mpirun", "-np", str(ranks), "--oversubscribe", *argv, "-parallel"]
+    return argv
+
+
+def utility(case: Path, program: str, *options: str) -> None:
+    """Run a utility to its end, its output in `log.<program>`. CaseError with its own words where it fails."""
+    log = case / f"log.{program}"
+    with log.open("w") as output:
+        done = subprocess.run(
+            [*command(program, case), *options],
+            env=environment(),
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+        )
+    if done.returncode != 0:
+        raise CaseError(f"{program} failed: {fatal_message(log) or f'exit code {done.returncode}'} ({log})")
+
+
+def fatal_message(log: Path) -> str | None:
+    """The text of the first FOAM FATAL ERROR of a log, in one line; None where there is none."""
+    if not log.is_file():
+        return None
+    text = log.read_text(errors="replace")
+    match = re.search(r"--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\n\s*From |\Z)", text, re.DOTALL)
+    if match is None:
+        return None
+    lines = [re.sub(r"^\[\d+\]\s?", "", line).strip() for line in match.group(1).splitlines()]
+    message = " ".join(line for line in lines if line)
+    where = re.search(r"^(?:\[\d+\]\s)?file: (.+?) (?:from|at) line", text[match.end(1) :], re.MULTILINE)
+    return f"{message} (in {where.group(1)})" if where else message

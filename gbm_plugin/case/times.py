@@ -1,0 +1,127 @@
+"""Time folders of a case: where a run continues, and what an earlier one left is set aside, never deleted."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from PyFoam.RunDictionary.SolutionDirectory import SolutionDirectory
+
+from .dictionary import CaseError, Dictionary
+
+log = logging.getLogger(__name__)
+
+STATE_FILE = "uniform/fibers.npz"
+PREVIOUS = "previous"
+
+
+def time_folders(case: Path) -> dict[float, str]:
+    """Times with a folder in the case, or in its processor folders, and the folders' names."""
+    names = list(SolutionDirectory(str(case), archive=None, paraviewLink=False).getTimes())
+    if (case / "processor0").is_dir():
+        names += [p.name for p in (case / "processor0").iterdir() if p.is_dir()]
+    found = {}
+    for name in names:
+        try:
+            found[float(name)] = name
+        except ValueError:
+            continue
+    return found
+
+
+def is_complete(case: Path, name: str) -> bool:
+    """Whether a time folder holds a velocity and a fiber state, together or decomposed."""
+    for folder in (case / name, case / "processor0" / name):
+        velocity = any((folder / f).is_file() for f in ("U", "U.gz"))
+        if velocity and (folder / STATE_FILE).is_file():
+            return True
+    return False
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a run starts: at `time`, continuing an earlier run or not."""
+
+    time: float
+    continues: bool
+
+
+def choose_start(case: Path, start_time: float, end_time: float, time_step: float, fresh: bool) -> Start:
+    """Continue an unfinished run from its latest complete time; otherwise start from the beginning.
+
+    What a new start would overwrite is moved to `previous/<n>` in the case. A flow without fibers yet is
+    continued with new fibers. Only where controlDict says `startFrom latestTime`; else controlDict decides.
+    """
+    control = Dictionary.read(case, "system/controlDict")
+    if control.word("startFrom", default="latestTime") != "latestTime":
+        return Start(start_time, False)
+    times = time_folders(case)
+    later = [t for t in times if t > start_time]
+    complete = [t for t in later if is_complete(case, times[t])]
+    if not later or fresh:
+        set_aside(case, start_time, everything=True)
+        return Start(start_time, False)
+    if not complete:
+        if _has_fibers(case):
+            set_aside(case, start_time, everything=True)
+            log.info("no time folder is complete: starting again from time %g", start_time)
+            return Start(start_time, False)
+        return Start(max(later), True)  # a developed flow, to which fibers are added
+    latest = max(complete)
+    if latest > end_time - 0.5 * time_step:
+        log.info("the run to time %g is complete: starting a new one", latest)
+        set_aside(case, start_time, everything=True)
+        return Start(start_time, False)
+    log.info("continuing from time %g", latest)
+    set_aside(case, latest, everything=False)
+    return Start(latest, True)
+
+
+def _has_fibers(case: Path) -> bool:
+    return any(case.glob("postProcessing/fibers/*/fibers*.h5"))
+
+
+def set_aside(case: Path, after: float, everything: bool) -> Path | None:
+    """Move what a start at time `after` would overwrite to `previous/<n>`: later time folders, function
+    objects' output that starts there or later, logs; with `everything` also the start time's own folder and
+    the report. Nothing is moved where nothing is there."""
+    things = [p for p in case.glob("log.*") if p.name not in ("log.gbm",)]
+    if everything:
+        things += [case / "report", *case.glob("processor[0-9]*")]
+        if (case / "0.orig").is_dir():
+            things.append(case / "0")
+    folders = [case, *case.glob("processor[0-9]*")] if not everything else [case]
+    for folder in folders:
+        things += [p for p in _numbered(folder) if float(p.name) > after and p not in things]
+    for part in case.glob("postProcessing/*"):
+        things += [p for p in _numbered(part) if float(p.name) >= after * (1 - 1e-9)]
+    things = [p for p in things if p.exists()]
+    results = [p for p in things if p.name != "0" and not p.name.startswith("log.")]
+    if not results:
+        return None
+    number = 1
+    while (target := case / PREVIOUS / str(number)).exists():
+        number += 1
+    for thing in things:
+        place = target / thing.relative_to(case)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            shutil.move(thing, place)
+        except OSError as error:
+            raise CaseError(f"cannot move {thing} to {place}: {error.strerror}") from None
+    log.info("earlier results are in %s", target)
+    return target
+
+
+def _numbered(folder: Path) -> list[Path]:
+    found = []
+    for p in folder.iterdir() if folder.is_dir() else ():
+        try:
+            float(p.name)
+        except ValueError:
+            continue
+        if p.is_dir():
+            found.append(p)
+    return found

@@ -1,0 +1,297 @@
+"""The fiber daemon: moves a case's fibers while OpenFOAM solves the flow, one sample of it per step.
+
+After the sample of step n it advances the fibers to step n + 1 with what it knows (the history of the flow
+along each bead's path), sends the new positions and waits; OpenFOAM meanwhile solves step n + 1. Only the
+first steps, whose history is too short, are corrected with a second sample (`provisional`).
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import time as clock
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..case.dictionary import CaseError
+from ..case.scene import Family, Scene, read_scene
+from ..case.times import STATE_FILE
+from ..output.recording import FamilyRecord, Recorder
+from .channel import Channel, CouplingError, listen
+from .fleet import Fleet
+from .message import (
+    PROVISIONAL,
+    STOP,
+    Hello,
+    Kind,
+    Message,
+    ProtocolError,
+    decode_sample,
+    encode_array,
+    encode_welcome,
+)
+from .steptable import StepTable
+
+log = logging.getLogger(__name__)
+
+# prediction gap over the rms velocity at the beads: worth a word, and too much to go on with
+GAP_WARNING, GAP_LIMIT = 0.1, 1.0
+
+
+def serve(case: Path | str) -> None:
+    """Serve one run of the solver in `case`, then return.
+
+    Raises CaseError for mistakes in the case, CouplingError where the solver fails, FloatingPointError for a
+    value that is not finite, OSError where a recording cannot be written.
+    """
+    case = Path(case).resolve()
+    scene = read_scene(case)
+    stop = _StopFlag()
+    with listen(case, scene.coupling) as listener:
+        log.info("waiting for OpenFOAM (%s)", scene.coupling.transport)
+        channel = listener.accept(give_up=lambda: bool(stop))
+        if channel is None:
+            log.info("stopped before OpenFOAM came")
+            return
+        try:
+            Session(scene, channel, stop, getattr(listener, "token", "")).run()
+        except Exception as error:
+            _say_why(channel, str(error))
+            raise
+        finally:
+            channel.close()
+
+
+class _StopFlag:
+    """True once SIGINT or SIGTERM came: the run then ends after its next step, with everything written."""
+
+    def __init__(self) -> None:
+        self._set = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+
+    def _note(self, *_) -> None:
+        self._set = True
+
+    def __bool__(self) -> bool:
+        return self._set
+
+
+def _say_why(channel: Channel, text: str) -> None:
+    try:
+        channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()))
+    except CouplingError:
+        pass  # the solver is gone: nobody is left to tell
+
+
+class Session:
+    """One run of the solver, from HELLO to GOODBYE."""
+
+    def __init__(self, scene: Scene, channel: Channel, stop: _StopFlag, token: str):
+        self.scene = scene
+        self.channel = channel
+        self.stop = stop
+        self.token = token
+
+    def run(self) -> None:
+        first = self._receive(Kind.HELLO)
+        try:
+            hello = Hello.decode(first.payload)
+        except ProtocolError as error:
+            raise self.channel.error(str(error)) from None
+        self._check(hello)
+        self.step, self.time = first.step, first.time
+        self.time_step = hello.time_step
+        self.fleet = self._fibers(hello)
+        self.recorder = self._recorder(hello, first.time)
+        self.table = StepTable(self.recorder.path.parent, self.scene.families)
+        welcome = encode_welcome(self.fleet.need, self.fleet.sizes)
+        self.channel.send(Message(Kind.WELCOME, self.step, self.time, welcome))
+        try:
+            self._observe()
+            self._record()
+            while self._next_step():
+                pass
+        finally:
+            self.recorder.close()
+            self.table.close()
+
+    def _receive(self, *kinds: Kind) -> Message:
+        message = self.channel.receive()
+        if message.kind not in kinds:
+            expected = " or ".join(k.name for k in kinds)
+            raise self.channel.error(f"received {message.kind.name} where {expected} must come")
+        return message
+
+    def _check(self, hello: Hello) -> None:
+        """Compare what OpenFOAM runs with to the case that this daemon read."""
+        if hello.token != self.token:
+            raise self.channel.error("the solver that connected has not the token of this daemon")
+        pairs = [
+            ("nu", hello.viscosity, self.scene.viscosity),
+            ("deltaT", hello.time_step, self.scene.time_step),
+        ]
+        if self.scene.box is not None:
+            pairs += zip(
+                ("box length in x", "box length in y", "box length in z"),
+                np.subtract(hello.box_max, hello.box_min),
+                self.scene.box,
+                strict=True,
+            )
+        for name, theirs, ours in pairs:
+            if abs(theirs - ours) > 1e-6 * abs(ours):
+                raise self.channel.error(
+                    f"OpenFOAM runs with {name} = {theirs:g}, the case {self.scene.case} says {ours:g}: "
+                    "daemon and solver are not on the same case, or it was edited in between"
+                )
+
+    def _fibers(self, hello: Hello) -> Fleet:
+        """New fibers, or those of the time folder that OpenFOAM starts from."""
+        fleet = Fleet.seeded(self.scene, hello.box_min, hello.box_max, self.time)
+        folder = find_state(self.scene.case, hello.folder)
+        if folder is None:
+            others = states(self.scene.case)
+            if others and max(others) > 0 and self.time > 0:
+                raise CaseError(
+                    f"time {self.time:g} has no complete fiber state (killed while writing?); there are "
+                    f"states at {', '.join(f'{t:g}' for t in sorted(others))}: start from one of these "
+                    "('gbm run' does), or remove them all to begin with new fibers"
+                )
+            log.info("time %g: %d beads of new fibers", self.time, fleet.beads)
+        else:
+            fleet.restore(folder)
+            if abs(fleet.time - self.time) > 1e-6 * self.time_step:
+                raise CaseError(f"{folder / STATE_FILE} is of time {fleet.time:g}, not {self.time:g}")
+            self.time = fleet.time
+            log.info("time %g: fibers continue from %s", self.time, folder / STATE_FILE)
+        return fleet
+
+    def _recorder(self, hello: Hello, start: float) -> Recorder:
+        folder = self.scene.case / "postProcessing/fibers" / Path(hello.folder).name
+        path = folder / "fibers.h5"
+        number = 1
+        while path.exists():  # an earlier attempt from the same start
+            number += 1
+            path = folder / f"fibers_{number}.h5"
+        return Recorder(
+            path,
+            [family_record(f) for f in self.scene.families],
+            box_origin=hello.box_min,
+            box_size=np.subtract(hello.box_max, hello.box_min),
+            viscosity=self.scene.dynamic_viscosity,
+            density=self.scene.density,
+            dictionaries=self.scene.texts,
+            program_version=__version__,
+        )
+
+    def _send_positions(self) -> None:
+        flags = (PROVISIONAL if self.fleet.provisional else 0) | (STOP if self.stop else 0)
+        payload = encode_array(self.fleet.positions)
+        self.channel.send(Message(Kind.POSITIONS, self.step, self.time, payload, flags))
+        self.sent_at = clock.time()
+
+    def _observe(self) -> bool:
+        """Send the positions of this step until their sample is final; False where OpenFOAM ends instead."""
+        while True:
+            provisional = self.fleet.provisional
+            self._send_positions()
+            message = self._receive(Kind.SAMPLE, Kind.SAVE, Kind.END)
+            if message.kind is Kind.END:
+                self._goodbye(message)
+                return False
+            folder = None
+            if message.kind is Kind.SAVE:
+                folder = self.scene.case / message.payload.decode()
+                message = self._receive(Kind.SAMPLE)
+            if message.step != self.step or abs(message.time - self.time) > 1e-6 * self.time_step:
+                raise self.channel.error(
+                    f"SAMPLE is of step {message.step}, time {message.time:g}; "
+                    f"step {self.step}, time {self.time:g} must come"
+                )
+            self.arrived_at = clock.time()
+            try:
+                velocity, extra = decode_sample(message, self.fleet.beads, self.fleet.need)
+            except ProtocolError as error:
+                raise self.channel.error(str(error)) from None
+            self.fleet.observe(self.time, velocity, extra)
+            if provisional:
+                self.fleet.correct()
+                continue
+            self._watch(velocity)
+            ratios = self.fleet.end_to_end_ratio()
+            self.table.add(self.time, self.step, self.sent_at, self.arrived_at, self.gap, ratios)
+            if folder is not None:
+                self.fleet.save(folder, self.step, self.time)
+            return True
+
+    def _watch(self, velocity: np.ndarray) -> None:
+        """The gap between predicted and received flow is an error that no estimate inside the fibers sees."""
+        rms = float(np.sqrt(np.mean(velocity**2) * 3))
+        self.gap = self.fleet.prediction_gap
+        if rms > 0 and self.gap > GAP_LIMIT * rms:
+            raise CaseError(
+                f"step {self.step}: the flow at a fiber was predicted with an error of {self.gap:g} m/s, more "
+                f"than its rms of {rms:g} m/s: deltaT = {self.time_step:g} is too long for this flow"
+            )
+        if rms > 0 and self.gap > GAP_WARNING * rms:
+            log.warning(
+                "step %d: flow predicted with an error of %.0f %% of its rms: a shorter deltaT would be wise",
+                self.step,
+                100 * self.gap / rms,
+            )
+
+    def _next_step(self) -> bool:
+        self.fleet.advance(self.time_step)
+        self.step += 1
+        self.time = self.fleet.time
+        if not self._observe():
+            return False
+        if self.step % self.scene.record_interval == 0:
+            self._record()
+        return True
+
+    def _record(self) -> None:
+        self.recorder.append(self.step, self.time, self.fleet.by_family)
+
+    def _goodbye(self, end: Message) -> None:
+        self.channel.send(Message(Kind.GOODBYE, end.step, end.time))
+        log.info("time %g: OpenFOAM ended the run; recorded in %s", end.time, self.recorder.path)
+
+
+def family_record(f: Family) -> FamilyRecord:
+    """What the recording says of a family."""
+    model = {
+        "integrator": f.model.integrator,
+        "mobility": f.model.mobility,
+        "bendingTorque": f.model.bending_torque,
+        "curvatureLaw": f.model.curvature_law,
+        "strainCoupling": "yes" if f.model.strain_coupling else "no",
+        "shape": f.shape,
+    }
+    if f.model.tolerance is not None:
+        model["tolerance"] = repr(f.model.tolerance)
+    return FamilyRecord(f.name, f.count, f.beads, f.radius, f.bending_stiffness, f.seed, model)
+
+
+def states(case: Path) -> dict[float, Path]:
+    """Time folders of the case, serial or decomposed, that hold a complete fiber state."""
+    found = {}
+    for pattern in ("processor0/*", "*"):
+        for path in case.glob(f"{pattern}/{STATE_FILE}"):
+            folder = path.parent.parent
+            try:
+                found[float(folder.name)] = folder
+            except ValueError:
+                continue
+    return found
+
+
+def find_state(case: Path, folder: str) -> Path | None:
+    """Where the state of this time folder is: there, or in the other of the serial and decomposed ones."""
+    name = Path(folder).name
+    for candidate in (case / folder, case / name, case / "processor0" / name):
+        if (candidate / STATE_FILE).is_file():
+            return candidate
+    return None

@@ -1,0 +1,68 @@
+"""What a run shows while it goes on: a bar with the time remaining on a terminal, nothing elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
+
+TAIL = 4096  # bytes of a table that surely hold its last row
+
+
+class Progress:
+    """A context manager; `update` reads the newest rows of the run's tables and redraws."""
+
+    def __init__(self, scene, start_time: float):
+        self._case: Path = scene.case
+        self._start = start_time
+        self._end = scene.end_time
+        columns = (
+            TextColumn("t = {task.fields[now]}"),
+            BarColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[state]}"),
+        )
+        console = Console(file=sys.stderr)
+        self._bar = Bar(*columns, console=console, disable=not console.is_terminal)
+        self._task = self._bar.add_task("", total=self._end - self._start, now=f"{start_time:g}", state="")
+
+    def __enter__(self) -> Progress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._bar.stop()
+
+    def update(self) -> None:
+        if self._bar.disable:
+            return
+        flow = newest_row(self._case, "linearForcing/*/linearForcing.dat")
+        fibers = newest_row(self._case, "fibers/*/daemon.dat")
+        time = fibers.get("Time", flow.get("Time", self._start))
+        parts = []
+        if flow:
+            parts.append(f"k {flow['k']:.4g}  ε {flow['epsilonBudget']:.4g}  Re_λ {flow['ReLambda']:.3g}")
+        ratios = [f"{value:.3f}" for name, value in fibers.items() if name.startswith("R2_")]
+        if ratios:
+            parts.append(f"⟨R²⟩/L² {' '.join(ratios)}")
+        self._bar.update(self._task, completed=time - self._start, now=f"{time:g}", state="  ".join(parts))
+
+
+def newest_row(case: Path, pattern: str) -> dict[str, float]:
+    """The last whole row of the newest table in postProcessing that fits the pattern; empty without one."""
+    tables = sorted(case.glob(f"postProcessing/{pattern}"), key=lambda p: p.stat().st_mtime)
+    if not tables:
+        return {}
+    with tables[-1].open("rb") as file:
+        head = file.read(TAIL)
+        file.seek(max(0, file.seek(0, 2) - TAIL))
+        lines = file.read().decode(errors="replace").split("\n")[:-1]  # what follows the last newline is partial
+    header = [line for line in head.decode(errors="replace").splitlines() if line.startswith("#")]
+    try:
+        names = header[-1].lstrip("# ").split()
+        values = [float(x) for x in lines[-1].split()]
+    except (IndexError, ValueError):
+        return {}
+    return dict(zip(names, values, strict=False))

@@ -1,0 +1,181 @@
+"""One scene brought together: the case prepared, solver and daemon started, watched and ended."""
+
+from __future__ import annotations
+
+import fcntl
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .case.dictionary import CaseError
+from .case.openfoam import command, environment, fatal_message, utility
+from .case.prepare import prepare, ranks_of
+from .case.scene import Scene, read_scene
+from .case.times import choose_start
+from .output.progress import Progress
+
+log = logging.getLogger(__name__)
+
+GRACE = 10.0  # how long one side may outlive the other before it is ended [s]
+
+
+class RunError(RuntimeError):
+    """A run that did not reach its end: names the cause, the side that failed and its log."""
+
+
+def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> None:
+    """Run a case with OpenFOAM and the fiber daemon to its endTime, continuing an unfinished run.
+
+    parallel: on the ranks of system/decomposeParDict; fresh: from the beginning, earlier results set aside.
+    Raises CaseError for a mistake in the case, RunError where a process fails.
+    """
+    case = Path(case).resolve()
+    scene = read_scene(case)
+    if scene.forcing is not None and scene.forcing.type == "eswaranPope":
+        raise CaseError(
+            f"{case}/constant/fvOptions: eswaranPope is a forcing of the spectral solver; OpenFOAM has "
+            "linearForcing (gbm run --flow spectral runs this case)"
+        )
+    ranks = ranks_of(case, parallel)
+    with _only_run(case):
+        start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)
+        prepare(scene, start, ranks)
+        _remove_addresses(case)
+        _Pair(scene, ranks, start.time).run()
+        if ranks > 1:
+            utility(case, "reconstructPar", "-newTimes")
+
+
+@contextmanager
+def _only_run(case: Path) -> Iterator[None]:
+    """A lock that ends with this process, so that two runs never write into one case."""
+    try:
+        file = (case / ".gbm.lock").open("a+")
+    except OSError as error:
+        raise CaseError(f"cannot write in {case}: {error.strerror}") from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.seek(0)
+            raise CaseError(f"another run is under way in {case} (process {file.read().strip()})") from None
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+        yield
+
+
+def _remove_addresses(case: Path) -> None:
+    """Addresses that a killed daemon left; a living one holds on to its socket and is not harmed."""
+    for name in ("gbm.tcp", "exchange/session"):
+        (case / name).unlink(missing_ok=True)
+
+
+class _Pair:
+    """The two processes of a run."""
+
+    def __init__(self, scene: Scene, ranks: int, start_time: float):
+        self.scene = scene
+        self.case = scene.case
+        self.ranks = ranks
+        self.start_time = start_time
+        self.daemon_log = self.case / "log.gbmDaemon"
+        self.solver_log = self.case / f"log.{scene.application}"
+        self.stopping = 0
+
+    def run(self) -> None:
+        # in sessions of their own: Ctrl-C reaches this process alone, which then ends both in order
+        daemon = [sys.executable, "-m", "gbm_plugin.cli", "daemon", str(self.case)]
+        solver = command(self.scene.application, self.case, self.ranks)
+        handlers = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            with self.daemon_log.open("w") as d, self.solver_log.open("w") as s:
+                self.daemon = _start(daemon, d)
+                self.solver = _start(solver, s)
+                self._watch()
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+            for process in (getattr(self, "daemon", None), getattr(self, "solver", None)):
+                if process is not None:
+                    _end(process)
+        self._judge()
+
+    def _stop(self, *_) -> None:
+        self.stopping += 1
+        if self.stopping == 1:
+            log.info("stopping: the flow is written after the step under way (once more: at once)")
+            self.daemon.terminate()  # which asks OpenFOAM to write and end
+        else:
+            self.solver.terminate()
+
+    def _watch(self) -> None:
+        """Until both have ended; one that outlives the other by more than the grace time is ended."""
+        alone_since = None
+        with Progress(self.scene, self.start_time) as progress:
+            while self.solver.poll() is None or self.daemon.poll() is None:
+                time.sleep(0.1)
+                progress.update()
+                if self.solver.poll() is None and self.daemon.poll() is None:
+                    continue
+                alone_since = alone_since or time.monotonic()
+                if time.monotonic() - alone_since > GRACE:
+                    self.solver.terminate()
+                    self.daemon.terminate()
+            progress.update()
+
+    def _judge(self) -> None:
+        solver, daemon = self.solver.returncode, self.daemon.returncode
+        if solver == 0 and daemon == 0:
+            if self.stopping:
+                raise RunError("stopped on request; everything is written: the same command continues")
+            return
+        problem = fatal_message(self.solver_log)
+        daemon_problem = _last_error(self.daemon_log)
+        name = self.scene.application
+        causes = []
+        if solver < 0 and not problem:
+            causes.append(f"{name} was ended by {signal.Signals(-solver).name} ({self.solver_log})")
+        if daemon < 0:
+            causes.append(f"the daemon was ended by {signal.Signals(-daemon).name} ({self.daemon_log})")
+        if daemon > 0 and daemon_problem and (not problem or "the daemon stopped:" in problem):
+            causes.append(daemon_problem)
+        elif problem:
+            causes.append(f"{name}: {problem} ({self.solver_log})")
+        if not causes:
+            codes = f"{name} ended with exit code {solver}, the daemon with {daemon}"
+            causes.append(f"{codes} ({self.solver_log}, {self.daemon_log})")
+        raise RunError("; ".join(causes))
+
+
+def _start(argv: list[str], output) -> subprocess.Popen:
+    return subprocess.Popen(
+        argv,
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+
+
+def _end(process: subprocess.Popen) -> None:
+    """The process and all that it started are gone when this returns."""
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+def _last_error(path: Path) -> str | None:
+    lines = [line for line in path.read_text(errors="replace").splitlines() if line.startswith("gbm daemon: ")]
+    return lines[-1].removeprefix("gbm daemon: ") if lines else None
