@@ -1,8 +1,8 @@
 """Third-order Adams–Bashforth steps for links that turn, with a consistent start.
 
-The rotation vector of a step from t to t + h with rates w_n, w_(n−1), w_(n−2) is ∫w of the polynomial through them,
-plus the leading Magnus term −(h³/12) w_n × w', w' = (w_n − w_(n−1))/(t_n − t_(n−1)), since rotations do not commute.
-The first two steps, without history, are midpoint steps: their error is of third order, once.
+The rotation vector of a step from t to t + h with rates w_n, w_(n−1), w_(n−2) is ∫w of the polynomial through
+them, plus the leading Magnus term −(h³/12) w_n × w', w' = (w_n − w_(n−1))/(t_n − t_(n−1)): rotations do not
+commute. The first two steps, without history, are midpoint steps: their error is of third order, once.
 """
 
 import numpy as np
@@ -10,9 +10,41 @@ from numba import njit, prange
 
 from .free_drain import link_rates
 from .layout import rotated
-from .simd import add, add_scaled, cross, dot, larger, load, load3, scale, splat, sqrt, store, store3, subtract
+from .simd import (
+    add,
+    add_scaled,
+    cross,
+    dot,
+    larger,
+    load,
+    load3,
+    scale,
+    splat,
+    sqrt,
+    store,
+    store3,
+    subtract,
+)
 
-STAGES = 2  # flow evaluations per step that the plan holds: at its start, and in its middle (used by the start)
+STAGES = 2  # times per step at which the flow is wanted: its start, and its middle (by a starting step)
+TENSION_LIMIT = 0.38  # (6/11 − 0.206)/0.87: what bending at eq. (10) leaves of the stability limit
+
+
+def scratch_rows(beads: int) -> int:
+    """Scratch rows per thread for fibers of so many beads."""
+    return 30 * beads
+
+
+def stable_step(fibers, softness: float, tension: float) -> float:
+    """Largest stable step: eq. (10), times softness, cos²(θ/2) of the sharpest joint of a discrete rod.
+
+    A chain under tension T relaxes transversely at up to 0.87 T/(6πμa 2a), which for long chains in strong
+    extension can exceed the rate of bending; tension: T/6πμa.
+    """
+    diameter = 2 * fibers.radius
+    stiffest = fibers.bending_stiffness.max()
+    bending = fibers.viscosity * diameter**4 / stiffest * softness if stiffest > 0 else np.inf
+    return min(bending, TENSION_LIMIT * diameter / tension if tension > 0 else np.inf)
 
 
 def plan(ages: list[float], step: float, count: int) -> np.ndarray:
@@ -51,7 +83,7 @@ def _blend(samples, b, weights, out):
 
 
 @njit(forceinline=True)
-def _turn_links(state, angles, factor, out):
+def turn_links(state, angles, factor, out):
     """out = state with links turned by factor × angles and the centre moved by factor × its velocity."""
     links = state.shape[0] // 3 - 1
     for i in range(links):
@@ -91,10 +123,10 @@ def advance(state, newest, older, velocity, rotation, weights, steps, beta, radi
                 pull = link_rates(now, u, spins, load(beta, b), radius, law, pivots, multipliers, w)
                 total = splat(0.0)
                 if start:
-                    _turn_links(now, w, 0.5 * h, middle)
+                    turn_links(now, w, 0.5 * h, middle)
                     u, spins = _blend(velocity, b, weights[s, 1], flow), _blend(rotation, b, weights[s, 1], spin)
                     pull = link_rates(middle, u, spins, load(beta, b), radius, law, pivots, multipliers, rates)
-                    _turn_links(now, rates, h, out[b])
+                    turn_links(now, rates, h, out[b])
                     for i in range(links):
                         gap = scale(h, subtract(load3(rates, i), load3(w, i)))
                         total = total + dot(gap, gap)

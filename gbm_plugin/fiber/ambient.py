@@ -33,7 +33,7 @@ class Ambient:
 
     def observe(self, time: float, velocity, extra) -> None:
         """Take a sample (F, N, 3), (F, N, 3) or (F, N, 3, 3); one at the newest time replaces that one."""
-        fields = self._fields(velocity, extra)
+        fields = self._fields(time, velocity, extra)
         if self.times and time < self.times[-1]:
             raise ValueError(f"sample at time {time:g} is older than the last one, at {self.times[-1]:g}")
         if self.times and time == self.times[-1]:
@@ -47,7 +47,7 @@ class Ambient:
         self.times.append(float(time))
         self.samples.append(tuple(pack(field, out) for field, out in zip(fields, buffers, strict=True)))
 
-    def _fields(self, velocity, extra) -> tuple[np.ndarray, ...]:
+    def _fields(self, time, velocity, extra) -> tuple[np.ndarray, ...]:
         velocity, extra = np.asarray(velocity, dtype=float), np.asarray(extra, dtype=float)
         tail = (3, 3) if self.need == "gradient" else (3,)
         for name, array, shape in (
@@ -56,6 +56,9 @@ class Ambient:
         ):
             if array.shape != shape:
                 raise ValueError(f"sampled {name} has shape {array.shape}; it must be {shape}")
+            if not np.isfinite(array.sum()):
+                wrong = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))
+                raise FloatingPointError(f"sampled {name} at time {time:g} is not finite at fiber {wrong[0]}")
         if self.need == "rotation":
             return velocity, extra
         gradient, transpose = extra, np.swapaxes(extra, -1, -2)

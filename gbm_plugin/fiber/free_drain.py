@@ -1,7 +1,7 @@
 """Free drain: every bead feels its own Stokes drag only, and the rolling constraint is block tridiagonal.
 
-With drag 6πμa and 8πμa³, ambient velocity U and rotation Ω, moments M in units of K/2a, and multipliers λ scaled to
-velocities (contact force × 1/6πμa), bead velocities and link rates are
+With drag 6πμa and 8πμa³, ambient velocity U and rotation Ω, moments M in units of K/2a, and multipliers λ
+scaled to velocities (contact force × 1/6πμa), bead velocities and link rates are
 
     v_i = U_i + λ_i − λ_(i−1),        2a de_i/dt = v_(i+1) − v_i,
 
@@ -11,49 +11,15 @@ and rolling, v_i − a e_i×ω_i = v_(i+1) + a e_i×ω_(i+1), gives for every li
         = U_(i+1) − U_i + e_i × [a(Ω_i + Ω_(i+1)) + β(M_(i+1) − M_(i−1) + M_(i+2) − M_i)],
     B_i = (3/4 e_(i−1)·e_i − 1) I − 3/4 e_(i−1) e_iᵀ.
 
-The matrix is symmetric positive definite; it is solved by block elimination, whose 3×3 products keep the form of B.
+The matrix is symmetric positive definite; it is solved by block elimination.
 """
 
 from numba import njit
 
 from .bending import moment
 from .layout import difference, mean_vector
+from .matrix3 import apply_symmetric, inverse_symmetric, load6
 from .simd import add, add_scaled, cross, dot, larger, load, load3, scale, splat, store, store3, subtract, zero3
-
-
-@njit(forceinline=True)
-def inverse_symmetric(s):
-    """Inverse of a symmetric 3×3 matrix (xx, xy, xz, yy, yz, zz)."""
-    xx = s[3] * s[5] - s[4] * s[4]
-    xy = s[2] * s[4] - s[1] * s[5]
-    xz = s[1] * s[4] - s[2] * s[3]
-    r = 1.0 / (s[0] * xx + s[1] * xy + s[2] * xz)
-    yy = s[0] * s[5] - s[2] * s[2]
-    yz = s[1] * s[2] - s[0] * s[4]
-    zz = s[0] * s[3] - s[1] * s[1]
-    return r * xx, r * xy, r * xz, r * yy, r * yz, r * zz
-
-
-@njit(forceinline=True)
-def apply_symmetric(s, v):
-    """Symmetric 3×3 matrix times vector."""
-    return (
-        s[0] * v[0] + s[1] * v[1] + s[2] * v[2],
-        s[1] * v[0] + s[3] * v[1] + s[4] * v[2],
-        s[2] * v[0] + s[4] * v[1] + s[5] * v[2],
-    )
-
-
-@njit(forceinline=True)
-def _load6(array, i):
-    return (
-        load(array, 6 * i),
-        load(array, 6 * i + 1),
-        load(array, 6 * i + 2),
-        load(array, 6 * i + 3),
-        load(array, 6 * i + 4),
-        load(array, 6 * i + 5),
-    )
 
 
 @njit(forceinline=True)
@@ -74,7 +40,7 @@ def _pivot(e, p, alpha, x):
 
 @njit
 def link_rates(state, velocity, rotation, beta, radius, law, pivots, multipliers, rates):
-    """Rotation rates of the links and, in the last place, the velocity of the centre of mass: rates (3N, LANES).
+    """Rotation rates of the links and, in the last place, the velocity of the centre of mass: (3N, LANES).
 
     multipliers (3(N−1), LANES) receives λ; pivots (6(N−1), LANES) is scratch. Returns the largest |e·λ|, the
     tension in units of 6πμa × velocity.
@@ -115,7 +81,7 @@ def link_rates(state, velocity, rotation, beta, radius, law, pivots, multipliers
         alpha = 0.75 * dot(e, above_e) - 1.0
         r = add_scaled(load3(multipliers, i), -1.0 * alpha, above)
         r = add_scaled(r, 0.75 * dot(e, above), above_e)
-        above = apply_symmetric(_load6(pivots, i), r)
+        above = apply_symmetric(load6(pivots, i), r)
         store3(multipliers, i, above)
         above_e = e
     tension = splat(0.0)

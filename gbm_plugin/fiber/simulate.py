@@ -24,7 +24,7 @@ def simulate(
     flow,
     time_step,
     end_time,
-    integrator="ab3",
+    integrator="implicit",
     mobility="freeDrain",
     strain_coupling=False,
     tolerance=None,

@@ -5,19 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numba import get_num_threads
 
-from . import ab3
+from . import ab3, implicit
 from .ambient import Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .fibers import Fibers, one_of, positive
-from .layout import bead_positions, pack, unpack
+from .layout import bead_positions, pack
 from .simd import LANES
 
-INTEGRATORS = ("ab3",)
+INTEGRATORS = ("ab3", "implicit", "auto")
 MOBILITIES = ("freeDrain",)
+TOLERANCE = 1e-4  # error estimate per accepted step: bead displacement over fiber length
+MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
+SMALLEST_STEP = 1e-12  # of a flow step, by implicit
 
 
 class Stepper:
-    """Time stepping of one family, fed with one sample of the flow at the beads per step."""
+    """Time stepping of one family, fed with one sample of the flow at the beads per step.
+
+    integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto" (ab3
+    where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber). tolerance: largest
+    error estimate of one accepted step of one fiber, as rms link rotation in rad, that is bead displacement over
+    fiber length (for implicit and auto; None: 1e-4).
+
+    need says what observe() takes beside the velocity. The loop of a run:
+
+        stepper.observe(time, velocity, extra)                  # at stepper.positions
+        each step:  stepper.advance(dt)
+                    while stepper.provisional: observe(time + dt, …); stepper.correct()
+                    stepper.observe(time + dt, …)
+    """
 
     def __init__(
         self,
@@ -31,22 +47,37 @@ class Stepper:
         self.fibers = fibers
         self.integrator = one_of("integrator", integrator, INTEGRATORS)
         self.mobility = one_of("mobility", mobility, MOBILITIES)
+        if strain_coupling and mobility == "freeDrain":
+            raise ValueError("strain_coupling with mobility freeDrain has no effect; it needs rpy")
         self.need = "gradient" if strain_coupling else "rotation"
+        self.tolerance = positive("tolerance", TOLERANCE if tolerance is None else tolerance)
         self.time = float(time)
         self.provisional = False
         self._ambient = Ambient(fibers.count, fibers.beads, self.need)
         self._beta = pack(velocity_scale(fibers))[:, 0]
+        self._law = CURVATURE_LAWS.index(fibers.curvature_law)
+        blocks, rows = -(-fibers.count // LANES), 3 * fibers.beads
+        # state before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
+        self._last = np.zeros((blocks, rows, LANES))
         self._state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
-        self._last = np.empty_like(self._state)
+        self._last_multipliers = np.zeros((blocks, rows - 3, LANES))
+        self._multipliers = np.zeros((blocks, rows - 3, LANES))
+        self._last_rates = [np.zeros_like(self._state) for _ in range(2)]
+        self._rates = list(self._last_rates)
         self._spare = [np.zeros_like(self._state) for _ in range(2)]
-        self._given = [np.zeros_like(self._state) for _ in range(2)]  # rates w_(n−1), w_(n−2) before the last step
-        self._rates = list(self._given)  # and after it
+        self._last_ages: list[float] = []
         self._ages: list[float] = []
-        self._before = None
-        self._error = np.zeros((len(self._state), LANES))
-        self._tension = np.zeros_like(self._error)
-        self._scratch = np.zeros((get_num_threads(), 10 * self._state.shape[1], LANES))
-        self._report = {"substeps": 0, "refinements": 0, "worst_error": 0.0}
+        self._last_step = np.full(fibers.count, np.inf)  # suggested to each fiber
+        self._step = self._last_step.copy()
+        self._last_tension = 0.0
+        self._tension = 0.0
+        self._start, self._length = self.time, 0.0  # of the last step
+        self._scratch = np.zeros((get_num_threads(), self._scratch_rows(), LANES))
+        self._counts = {"steps": 0, "substeps": 0, "refinements": 0, "refined_fibers": 0, "worst_error": 0.0}
+
+    def _scratch_rows(self) -> int:
+        explicit = ab3.scratch_rows(self.fibers.beads)
+        return explicit if self.integrator == "ab3" else max(explicit, implicit.scratch_rows(self.fibers.beads))
 
     @property
     def positions(self) -> np.ndarray:
@@ -61,77 +92,175 @@ class Stepper:
         return self._ambient.prediction_gap
 
     def observe(self, time, velocity, extra) -> None:
-        """Take the flow at the current positions: velocity (F, N, 3), rotation (F, N, 3) or gradient (F, N, 3, 3)."""
+        """Take the flow at the current positions: velocity (F, N, 3); rotation (F, N, 3) or gradient.
+
+        A second sample at the same time replaces the first. Raises ValueError for another time or shape,
+        FloatingPointError for NaN.
+        """
         if time != self.time:
             raise ValueError(f"sample is of time {time:g}; the fibers are at time {self.time:g}")
         self._ambient.observe(time, velocity, extra)
 
     def advance(self, time_step) -> None:
-        """Advance by time_step, extrapolating the samples in time along each bead's path."""
-        step = positive("time_step", time_step)
+        """Advance by time_step, extrapolating the samples in time along each bead's path.
+
+        Raises ValueError without a sample at the present time, FloatingPointError where a fiber becomes NaN.
+        """
+        length = positive("time_step", time_step)
         if not self._ambient.times or self._ambient.times[-1] != self.time:
             raise ValueError(f"no sample of the flow at time {self.time:g}; observe() comes before advance()")
         self.provisional = len(self._ambient) < 3
-        self._before = (self.time, step, list(self._ages))
+        self._start, self._length = self.time, length
         self._state, self._last = self._last, self._state
-        pool = [*self._given, *self._spare]
-        self._given = self._rates
-        self._spare = [array for array in pool if not any(array is kept for kept in self._given)]
-        self._step()
+        self._multipliers, self._last_multipliers = self._last_multipliers, self._multipliers
+        pool = [*self._last_rates, *self._spare]
+        self._last_rates = self._rates
+        self._spare = [array for array in pool if not any(array is kept for kept in self._rates)]
+        self._last_ages, self._last_tension = self._ages, self._tension
+        self._last_step = self._step.copy()
+        self._counts["steps"] += 1
+        self._run()
 
     def correct(self) -> None:
         """Redo the last step with the sample at its end included."""
         if not self.provisional or self._ambient.times[-1] != self.time:
             raise ValueError("correct() follows a provisional advance() and the observe() at its end")
         self.provisional = False
-        self._step()
+        self._run()
 
-    def _step(self) -> None:
-        """From _last at the time of _before into _state, with the samples that there are."""
-        start, step, ages = self._before
+    def _run(self) -> None:
+        """The last step, from its kept start, with the samples that there are."""
+        self.time = self._start + self._length
+        self._step[:] = self._last_step
+        if self.integrator == "implicit":
+            self._implicit(np.arange(self.fibers.count))
+            return
+        count = self._substeps()
+        if self.integrator == "ab3":
+            if count > MOST_SUBSTEPS:
+                raise ValueError(
+                    f"ab3 would need {count:.3g} sub-steps in a step of {self._length:g}; at most "
+                    f"{MOST_SUBSTEPS} are allowed: take the implicit integrator"
+                )
+            self._explicit(count)
+            return
+        everyone = np.arange(self.fibers.count)
+        if count == 1:
+            error = self._explicit(1)
+            self._implicit(everyone[~(error <= self.tolerance)])
+        else:
+            self._ages = []
+            self._implicit(everyone)
+
+    def _substeps(self) -> int:
+        """Sub-steps that keep ab3 stable: eq. (10), less for bent discrete rods and under great tension."""
         fibers = self.fibers
-        limit = fibers.viscosity * (2 * fibers.radius) ** 4 / max(fibers.bending_stiffness.max(), 1e-300)
-        count = max(1, int(np.ceil(step / limit * (1 - 1e-12))))
-        h = step / count
-        times, samples = self._ambient.recent()
-        weights = np.zeros((count, 2, 3))
+        softness = 1.0
+        if fibers.curvature_law == "discreteRod":
+            links = self._last.reshape(len(self._last), fibers.beads, 3, LANES)[:, :-1]
+            softness = min(1.0, 0.5 + 0.5 * (links[:, 1:] * links[:, :-1]).sum(axis=2).min(initial=1.0))
+        limit = ab3.stable_step(fibers, softness, self._last_tension)
+        return max(1, int(np.ceil(min(self._length / limit * (1 - 1e-12), 1e18))))
+
+    def _explicit(self, count: int) -> np.ndarray:
+        """All fibers by ab3 in count sub-steps; returns the error estimates (F,)."""
+        fibers, h = self.fibers, self._length / count
+        times, velocity, rotation = self._samples()
+        weights = np.zeros((count, ab3.STAGES, 3))
         for s in range(count):
-            for stage in range(2):
-                weights[s, stage, : len(times)] = lagrange_weights(times, start + (s + 0.5 * stage) * h)
-        velocity, rotation = ([*field, field[0], field[0]][:3] for field in list(zip(*samples, strict=True))[:2])
-        (given_new, given_old), (new, old) = self._given, self._spare
+            for stage in range(ab3.STAGES):
+                at = (s + stage / ab3.STAGES) * h
+                weights[s, stage, : len(times)] = lagrange_weights(times, at)
+        error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
+        new, old = self._spare
         ab3.advance(
-            self._last, (given_new, new), (given_old, old), tuple(velocity), tuple(rotation), weights,
-            ab3.plan(ages, h, count), self._beta, fibers.radius, CURVATURE_LAWS.index(fibers.curvature_law),
-            self._scratch, self._state, self._error, self._tension,
+            self._last, (self._last_rates[0], new), (self._last_rates[1], old), velocity, rotation, weights,
+            ab3.plan(self._last_ages, h, count), self._beta, fibers.radius, self._law, self._scratch,
+            self._state, error, tension,
         )  # fmt: skip
-        self._rates = [new, given_new if count == 1 else old]
-        self._ages = [h, *(2 * h if count > 1 else age + h for age in ([0.0] if count > 1 else ages[:1]))]
-        self.time = start + step
-        self._report["substeps"] += count
-        if not np.isfinite(self._error).all():
-            fiber = int(np.argmin(np.isfinite(unpack(self._error[:, None], (fibers.count, 1))[:, 0])))
-            raise FloatingPointError(f"fiber {fiber} became NaN in the step from time {start:g} to {self.time:g}")
+        self._rates = [new, self._last_rates[0] if count == 1 else old]
+        self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
+        self._tension = tension.max()
+        error = error.reshape(-1)[: fibers.count]
+        self._finite(error)
+        self._count(count, error)
+        return error
+
+    def _implicit(self, members: np.ndarray) -> None:
+        """The given fibers by linearly implicit steps, each with as many as its error estimate asks for."""
+        fibers, end = self.fibers, self._length
+        times, velocity, rotation = self._samples()
+        elapsed, error, trial = np.zeros(fibers.count), np.zeros(fibers.count), np.zeros(fibers.count)
+        source, lagged = self._last, self._last_multipliers
+        attempts, refined = 0, np.zeros(0, dtype=int)
+        while len(members):
+            remaining = end - elapsed[members]
+            trial[members] = remaining / np.ceil(np.maximum(remaining / self._step[members] * (1 - 1e-12), 1))
+            implicit.attempt(
+                members, source, lagged, velocity, rotation, times, self._beta, fibers.radius, self._law,
+                self.tolerance, self._scratch, trial, self._state, self._multipliers, elapsed, self._step, error,
+            )  # fmt: skip
+            source, lagged = self._state, self._multipliers
+            attempts += 1
+            self._count(0, error[members][error[members] <= self.tolerance])
+            if (trial[members] < SMALLEST_STEP * end).any():
+                self._finite(np.where(trial[members] < SMALLEST_STEP * end, np.nan, 0.0), members)
+            members = members[elapsed[members] < end * (1 - 1e-12)]
+            if attempts == 1:
+                refined = members
+            self._counts["refinements"] += len(members)
+        self._counts["refined_fibers"] += len(refined)
+        self._counts["substeps"] += attempts
+
+    def _samples(self):
+        """Times from the start of the step, and three samples each of velocity and rotation (the last repeated)."""
+        times, samples = self._ambient.recent()
+        fields = [tuple([*field, field[-1], field[-1]][:3]) for field in zip(*samples, strict=True)]
+        return np.array(times) - self._start, fields[0], fields[1]
+
+    def _count(self, substeps: int, error: np.ndarray) -> None:
+        self._counts["substeps"] += substeps
+        self._counts["worst_error"] = max(self._counts["worst_error"], float(error.max(initial=0.0)))
+
+    def _finite(self, error: np.ndarray, members=None) -> None:
+        """FloatingPointError naming the first fiber whose estimate is NaN."""
+        wrong = np.flatnonzero(~np.isfinite(error))
+        if len(wrong):
+            fiber = wrong[0] if members is None else members[wrong[0]]
+            raise FloatingPointError(
+                f"fiber {fiber} has no finite solution in step {self._counts['steps']}, "
+                f"from time {self._start:g} to {self.time:g}"
+            )
 
     def report(self) -> dict:
-        """Counts since the start: sub-steps, refinements, worst error estimate."""
-        return dict(self._report)
+        """Counts since the start: steps, sub-steps, refinements, fibers refined, worst accepted error estimate."""
+        return dict(self._counts)
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything that a bitwise restart needs."""
-        own = {"time": np.array(self.time), "fibers": self._state.copy(), "rate_ages": np.array(self._ages)}
-        return {**own, "rates": np.stack(self._rates), **self._ambient.state()}
+        own = {
+            "time": np.array(self.time),
+            "links_and_centres": self._state.copy(),
+            "multipliers": self._multipliers.copy(),
+            "rates": np.stack(self._rates),
+            "rate_ages": np.array(self._ages),
+            "suggested_step": self._step.copy(),
+            "tension": np.array(self._tension),
+        }
+        return {**own, **self._ambient.state()}
 
     def restore(self, state) -> None:
-        """Take back what state() gave."""
-        if state["fibers"].shape != self._state.shape:
-            raise ValueError(
-                f"state holds blocks of shape {state['fibers'].shape}; these fibers need {self._state.shape}"
-            )
+        """Take back what state() gave; ValueError if it is of other fibers."""
+        shape = np.shape(state["links_and_centres"])
+        if shape != self._state.shape:
+            raise ValueError(f"state holds blocks of shape {shape}; these fibers need {self._state.shape}")
         self.time = float(state["time"])
-        self._state[...] = state["fibers"]
+        self._state[...] = state["links_and_centres"]
+        self._multipliers[...] = state["multipliers"]
         self._rates = [np.array(rates) for rates in state["rates"]]
-        self._given = list(self._rates)
+        self._last_rates = list(self._rates)
         self._ages = [float(age) for age in state["rate_ages"]]
+        self._step = np.array(state["suggested_step"])
+        self._tension = float(state["tension"])
         self.provisional = False
         self._ambient.restore(state)

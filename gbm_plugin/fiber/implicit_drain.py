@@ -1,0 +1,191 @@
+"""One linearly implicit stage in free drain: the bending and contact torques are taken at links e + δe.
+
+With δe = h d (de/dt + κ × e) linear in the unknown multipliers, 2a de/dt = ΔU + Dλ, D the second difference, the
+rolling equations of free_drain become
+
+    A λ + σ Σ_k E_ik (D λ)_k = right side − σ Σ_k E_ik (ΔU + 2a κ × e)_k,     σ = h d/2a,
+
+where E_ik, k = i − 2 … i + 2, is minus the derivative of e_i × [β(M_(i+1) − M_(i−1) + M_(i+2) − M_i)
++ ¾(2 e_i × λ_i + e_(i−1) × λ_(i−1) + e_(i+1) × λ_(i+1))] with respect to the links in the bracket: bending, and the
+stiffness that contact forces give to a taut chain. Every E_ik is α I + p e_iᵀ (plus one outer product per joint for
+the discrete rod), and the matrix has seven block diagonals. It is solved by block elimination, O(N).
+"""
+
+from numba import njit
+
+from .bending import FOLD
+from .layout import difference, mean_vector
+from .matrix3 import apply, identity_plus, inverse, load9, minus_apply, minus_product, plus_outer, product, store9
+from .simd import add, add_scaled, cross, dot, larger, load, load3, scale, splat, store, store3, subtract, zero3
+
+PAD = 2  # zero vectors before and after the links of a padded array: no special rows at the ends
+
+
+def work_rows(beads: int) -> int:
+    """Rows of scratch that stage needs for fibers of so many beads."""
+    return 45 * beads + 120
+
+
+@njit(forceinline=True)
+def _joints(e, links, law, factor, slope, moments):
+    """f, df/dcosθ and moments of the joints 0 … links + 1 of padded links e (joint j lies before link j)."""
+    for j in range(links + 4):
+        store(factor, j, splat(0.0))
+        store(slope, j, splat(0.0))
+        store3(moments, j, zero3())
+    for j in range(1, links):
+        t, u = load3(e, j + PAD - 1), load3(e, j + PAD)
+        f = splat(1.0)
+        if law == 1:
+            f = 2.0 / larger(1.0 + dot(t, u), splat(FOLD))
+            store(slope, j + PAD, -0.5 * f * f)
+        store(factor, j + PAD, f)
+        store3(moments, j + PAD, scale(f, cross(t, u)))
+
+
+@njit(forceinline=True)
+def _second_difference(left, here, right):
+    """left − 2 here + right of a scalar of lanes."""
+    return left - 2.0 * here + right
+
+
+@njit(forceinline=True)
+def _second_difference3(left, here, right):
+    """left − 2 here + right of a vector."""
+    return add_scaled(add(left, right), -2.0, here)
+
+
+@njit(forceinline=True)
+def _outer_joint(row, y, t, u):
+    """Add y (D-combination of t, u)ᵀ to four neighbouring blocks: derivative of a joint's f, y its direction."""
+    a, b, c, d = row
+    return (
+        plus_outer(a, y, u),
+        plus_outer(b, y, add_scaled(t, -2.0, u)),
+        plus_outer(c, y, add_scaled(u, -2.0, t)),
+        plus_outer(d, y, t),
+    )
+
+
+@njit
+def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, work, multipliers, rates):
+    """Rates (3N, LANES) of a stage at the links of state, and its multipliers (3(N−1), LANES).
+
+    history (3N, LANES): κ, rotation rates added to the unknown ones in δe; lagged: the multipliers in E; sigma:
+    h d/2a per lane; work: scratch of work_rows(N) rows.
+    """
+    links = rates.shape[0] // 3 - 1
+    size = 3 * (links + 2 * PAD)
+    e, g, tension, moments = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size : 4 * size]
+    at = 4 * size
+    factor, slope = work[at : at + size // 3], work[at + size // 3 : at + 2 * size // 3]
+    at += size
+    upper = work[at : at + 27 * (links + 3)]
+    at += 27 * (links + 3)
+    solution = work[at : at + 3 * (links + 6)]
+    for k in range(PAD):
+        for end in (k, links + PAD + k):
+            store3(e, end, zero3())
+            store3(g, end, zero3())
+            store3(tension, end, zero3())
+    for k in range(81):
+        store(upper, k, splat(0.0))
+    for k in range(3):
+        store3(solution, k, zero3())
+        store3(solution, links + 3 + k, zero3())
+    for i in range(links):
+        link = load3(state, i)
+        store3(e, i + PAD, link)
+        store3(tension, i + PAD, load3(lagged, i))
+        turned = cross(load3(history, i), link)
+        store3(g, i + PAD, add_scaled(difference(velocity, i), 2.0 * radius, turned))
+    _joints(e, links, law, factor, slope, moments)
+    stiffness = sigma * beta
+    for i in range(links):
+        o = i + PAD
+        e0, e1, e2, e3, e4 = load3(e, o - 2), load3(e, o - 1), load3(e, o), load3(e, o + 1), load3(e, o + 2)
+        fa, fb = stiffness * load(factor, o - 1), stiffness * load(factor, o)
+        fc, fd = stiffness * load(factor, o + 1), stiffness * load(factor, o + 2)
+        c1, c3 = dot(e1, e2), dot(e2, e3)
+        # σ E at the five links around i
+        a0, p0 = fa * c1, scale(-1.0 * fa, e1)
+        a1, p1 = fb - fa * dot(e0, e2), subtract(scale(fa, e0), scale(fb, e2))
+        a2, p2 = -1.0 * (fb * c1 + fc * c3), add(scale(fb, e1), scale(fc, e3))
+        a3, p3 = fc - fd * dot(e2, e4), subtract(scale(fd, e4), scale(fc, e2))
+        a4, p4 = fd * c3, scale(-1.0 * fd, e3)
+        l1, l2, l3 = load3(tension, o - 1), load3(tension, o), load3(tension, o + 1)
+        s1, s2 = 0.75 * sigma, 1.5 * sigma
+        a1, p1 = a1 - s1 * dot(e2, l1), add_scaled(p1, s1, l1)
+        a2, p2 = a2 - s2 * dot(e2, l2), add_scaled(p2, s2, l2)
+        a3, p3 = a3 - s1 * dot(e2, l3), add_scaled(p3, s1, l3)
+        # right side
+        spin = scale(radius, add(load3(rotation, i), load3(rotation, i + 1)))
+        ahead = add(load3(moments, o + 1), load3(moments, o + 2))
+        torque = subtract(ahead, add(load3(moments, o - 1), load3(moments, o)))
+        right = add(difference(velocity, i), cross(e2, add_scaled(spin, beta, torque)))
+        g0, g1, g2, g3, g4 = load3(g, o - 2), load3(g, o - 1), load3(g, o), load3(g, o + 1), load3(g, o + 2)
+        right = add_scaled(add_scaled(right, -1.0 * a0, g0), -1.0 * dot(e2, g0), p0)
+        right = add_scaled(add_scaled(right, -1.0 * a1, g1), -1.0 * dot(e2, g1), p1)
+        right = add_scaled(add_scaled(right, -1.0 * a2, g2), -1.0 * dot(e2, g2), p2)
+        right = add_scaled(add_scaled(right, -1.0 * a3, g3), -1.0 * dot(e2, g3), p3)
+        right = add_scaled(add_scaled(right, -1.0 * a4, g4), -1.0 * dot(e2, g4), p4)
+        # the seven blocks of row i: A + σ E D
+        zero, none = splat(0.0), zero3()
+        m0 = identity_plus(a0, p0, e2)
+        m1 = identity_plus(a1 - 2.0 * a0, add_scaled(p1, -2.0, p0), e2)
+        p = add_scaled(_second_difference3(p0, p1, p2), -0.75, e1)
+        m2 = identity_plus(_second_difference(a0, a1, a2) + 0.75 * c1 - 1.0, p, e2)
+        p = add_scaled(_second_difference3(p1, p2, p3), -1.5, e2)
+        m3 = identity_plus(_second_difference(a1, a2, a3) + 3.5, p, e2)
+        p = add_scaled(_second_difference3(p2, p3, p4), -0.75, e3)
+        m4 = identity_plus(_second_difference(a2, a3, a4) + 0.75 * c3 - 1.0, p, e2)
+        m5 = identity_plus(_second_difference(a3, a4, zero), _second_difference3(p3, p4, none), e2)
+        m6 = identity_plus(a4, p4, e2)
+        if law == 1:
+            ya = scale(stiffness * load(slope, o - 1), cross(e2, cross(e0, e1)))
+            yb = scale(stiffness * load(slope, o), cross(e2, cross(e1, e2)))
+            yc = scale(-1.0 * stiffness * load(slope, o + 1), cross(e2, cross(e2, e3)))
+            yd = scale(-1.0 * stiffness * load(slope, o + 2), cross(e2, cross(e3, e4)))
+            m0, m1, m2, m3 = _outer_joint((m0, m1, m2, m3), ya, e0, e1)
+            m1, m2, m3, m4 = _outer_joint((m1, m2, m3, m4), yb, e1, e2)
+            m2, m3, m4, m5 = _outer_joint((m2, m3, m4, m5), yc, e2, e3)
+            m3, m4, m5, m6 = _outer_joint((m3, m4, m5, m6), yd, e3, e4)
+            right = add_scaled(right, -1.0 * (dot(e1, g0) + dot(e0, g1)), ya)
+            right = add_scaled(right, -1.0 * (dot(e2, g1) + dot(e1, g2)), yb)
+            right = add_scaled(right, -1.0 * (dot(e3, g2) + dot(e2, g3)), yc)
+            right = add_scaled(right, -1.0 * (dot(e4, g3) + dot(e3, g4)), yd)
+        # eliminate with the three rows before: each holds (U₁, U₂, U₃) and its right side
+        u = 3 * i
+        m1 = minus_product(m1, m0, load9(upper, u))
+        m2 = minus_product(m2, m0, load9(upper, u + 1))
+        m3 = minus_product(m3, m0, load9(upper, u + 2))
+        right = minus_apply(right, m0, load3(solution, i))
+        m2 = minus_product(m2, m1, load9(upper, u + 3))
+        m3 = minus_product(m3, m1, load9(upper, u + 4))
+        m4 = minus_product(m4, m1, load9(upper, u + 5))
+        right = minus_apply(right, m1, load3(solution, i + 1))
+        m3 = minus_product(m3, m2, load9(upper, u + 6))
+        m4 = minus_product(m4, m2, load9(upper, u + 7))
+        m5 = minus_product(m5, m2, load9(upper, u + 8))
+        right = minus_apply(right, m2, load3(solution, i + 2))
+        pivot = inverse(m3)
+        store9(upper, u + 9, product(pivot, m4))
+        store9(upper, u + 10, product(pivot, m5))
+        store9(upper, u + 11, product(pivot, m6))
+        store3(solution, i + 3, apply(pivot, right))
+    for k in range(links):
+        i = links - 1 - k
+        u = 3 * i + 9
+        x = load3(solution, i + 3)
+        x = minus_apply(x, load9(upper, u), load3(solution, i + 4))
+        x = minus_apply(x, load9(upper, u + 1), load3(solution, i + 5))
+        x = minus_apply(x, load9(upper, u + 2), load3(solution, i + 6))
+        store3(solution, i + 3, x)
+    store3(solution, 2, zero3())
+    for i in range(links):
+        here = load3(solution, i + 3)
+        store3(multipliers, i, here)
+        bend = _second_difference3(load3(solution, i + 2), here, load3(solution, i + 4))
+        gap = add(difference(velocity, i), bend)
+        store3(rates, i, scale(0.5 / radius, cross(load3(state, i), gap)))
+    store3(rates, links, mean_vector(velocity, links + 1))

@@ -1,0 +1,174 @@
+"""3×3 matrices of lanes: tuples of nine, row by row; symmetric ones tuples of six (xx, xy, xz, yy, yz, zz)."""
+
+from numba import njit
+
+from .simd import dot, load, store
+
+
+@njit(forceinline=True)
+def identity_plus(alpha, p, e):
+    """α I + p eᵀ."""
+    return (
+        alpha + p[0] * e[0],
+        p[0] * e[1],
+        p[0] * e[2],
+        p[1] * e[0],
+        alpha + p[1] * e[1],
+        p[1] * e[2],
+        p[2] * e[0],
+        p[2] * e[1],
+        alpha + p[2] * e[2],
+    )
+
+
+@njit(forceinline=True)
+def plus_outer(m, p, e):
+    """m + p eᵀ."""
+    return (
+        m[0] + p[0] * e[0],
+        m[1] + p[0] * e[1],
+        m[2] + p[0] * e[2],
+        m[3] + p[1] * e[0],
+        m[4] + p[1] * e[1],
+        m[5] + p[1] * e[2],
+        m[6] + p[2] * e[0],
+        m[7] + p[2] * e[1],
+        m[8] + p[2] * e[2],
+    )
+
+
+@njit(forceinline=True)
+def product(a, b):
+    """a b."""
+    return (
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
+        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
+        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
+        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+    )
+
+
+@njit(forceinline=True)
+def minus_product(m, a, b):
+    """m − a b."""
+    return (
+        m[0] - a[0] * b[0] - a[1] * b[3] - a[2] * b[6],
+        m[1] - a[0] * b[1] - a[1] * b[4] - a[2] * b[7],
+        m[2] - a[0] * b[2] - a[1] * b[5] - a[2] * b[8],
+        m[3] - a[3] * b[0] - a[4] * b[3] - a[5] * b[6],
+        m[4] - a[3] * b[1] - a[4] * b[4] - a[5] * b[7],
+        m[5] - a[3] * b[2] - a[4] * b[5] - a[5] * b[8],
+        m[6] - a[6] * b[0] - a[7] * b[3] - a[8] * b[6],
+        m[7] - a[6] * b[1] - a[7] * b[4] - a[8] * b[7],
+        m[8] - a[6] * b[2] - a[7] * b[5] - a[8] * b[8],
+    )
+
+
+@njit(forceinline=True)
+def minus_apply(v, a, x):
+    """v − a x."""
+    return (
+        v[0] - a[0] * x[0] - a[1] * x[1] - a[2] * x[2],
+        v[1] - a[3] * x[0] - a[4] * x[1] - a[5] * x[2],
+        v[2] - a[6] * x[0] - a[7] * x[1] - a[8] * x[2],
+    )
+
+
+@njit(forceinline=True)
+def apply(a, x):
+    """a x."""
+    return dot(a[0:3], x), dot(a[3:6], x), dot(a[6:9], x)
+
+
+@njit(forceinline=True)
+def inverse(m):
+    """Inverse by cofactors."""
+    c0 = m[4] * m[8] - m[5] * m[7]
+    c1 = m[5] * m[6] - m[3] * m[8]
+    c2 = m[3] * m[7] - m[4] * m[6]
+    r = 1.0 / (m[0] * c0 + m[1] * c1 + m[2] * c2)
+    return (
+        r * c0,
+        r * (m[2] * m[7] - m[1] * m[8]),
+        r * (m[1] * m[5] - m[2] * m[4]),
+        r * c1,
+        r * (m[0] * m[8] - m[2] * m[6]),
+        r * (m[2] * m[3] - m[0] * m[5]),
+        r * c2,
+        r * (m[1] * m[6] - m[0] * m[7]),
+        r * (m[0] * m[4] - m[1] * m[3]),
+    )
+
+
+@njit(forceinline=True)
+def load9(array, i):
+    """Matrix i of an array of matrices, rows 9 i … 9 i + 8."""
+    r = 9 * i
+    return (
+        load(array, r),
+        load(array, r + 1),
+        load(array, r + 2),
+        load(array, r + 3),
+        load(array, r + 4),
+        load(array, r + 5),
+        load(array, r + 6),
+        load(array, r + 7),
+        load(array, r + 8),
+    )
+
+
+@njit(forceinline=True)
+def store9(array, i, m):
+    """Write matrix i of an array of matrices."""
+    r = 9 * i
+    store(array, r, m[0])
+    store(array, r + 1, m[1])
+    store(array, r + 2, m[2])
+    store(array, r + 3, m[3])
+    store(array, r + 4, m[4])
+    store(array, r + 5, m[5])
+    store(array, r + 6, m[6])
+    store(array, r + 7, m[7])
+    store(array, r + 8, m[8])
+
+
+@njit(forceinline=True)
+def inverse_symmetric(s):
+    """Inverse of a symmetric matrix."""
+    xx = s[3] * s[5] - s[4] * s[4]
+    xy = s[2] * s[4] - s[1] * s[5]
+    xz = s[1] * s[4] - s[2] * s[3]
+    r = 1.0 / (s[0] * xx + s[1] * xy + s[2] * xz)
+    yy = s[0] * s[5] - s[2] * s[2]
+    yz = s[1] * s[2] - s[0] * s[4]
+    zz = s[0] * s[3] - s[1] * s[1]
+    return r * xx, r * xy, r * xz, r * yy, r * yz, r * zz
+
+
+@njit(forceinline=True)
+def apply_symmetric(s, v):
+    """Symmetric matrix times vector."""
+    return (
+        s[0] * v[0] + s[1] * v[1] + s[2] * v[2],
+        s[1] * v[0] + s[3] * v[1] + s[4] * v[2],
+        s[2] * v[0] + s[4] * v[1] + s[5] * v[2],
+    )
+
+
+@njit(forceinline=True)
+def load6(array, i):
+    """Symmetric matrix i of an array of them, rows 6 i … 6 i + 5."""
+    r = 6 * i
+    return (
+        load(array, r),
+        load(array, r + 1),
+        load(array, r + 2),
+        load(array, r + 3),
+        load(array, r + 4),
+        load(array, r + 5),
+    )
