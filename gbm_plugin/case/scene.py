@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from .dictionary import CaseError, Dictionary
 
 INTEGRATORS = ("ab3", "implicit", "auto")
@@ -13,7 +15,7 @@ MOBILITIES = ("freeDrain", "rpy")
 BENDING_TORQUES = ("consistent", "asPrinted")
 CURVATURE_LAWS = ("sine", "discreteRod")
 TRANSPORTS = ("socket", "tcp", "file")
-SHAPES = ("straight",)
+SHAPES = ("straight", "file")
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class Model:
 @dataclass(frozen=True)
 class Family:
     """Fibers that are alike but for their place: `count` fibers of `beads` beads, length 2 a N [m],
-    bending stiffness K^b [N m2]."""
+    bending stiffness K^b [N m2]. positions (count, beads, 3) [m] where the case gives them, else None:
+    straight fibers at random."""
 
     name: str
     count: int
@@ -41,6 +44,7 @@ class Family:
     seed: int
     shape: str
     model: Model
+    positions: np.ndarray | None = field(default=None, repr=False, compare=False)
 
     @property
     def radius(self) -> float:
@@ -121,7 +125,7 @@ def read_scene(case: Path | str) -> Scene:
         interpolation=fibers.word("interpolation", default="trilinear"),
         record_interval=fibers.integer("recordInterval", 10, least=1),
         coupling=_read_coupling(fibers),
-        families=_read_families(fibers),
+        families=_read_families(case, fibers),
         box=box,
         origin=origin,
         cells=cells,
@@ -157,42 +161,60 @@ def _read_model(d: Dictionary, default: Model) -> Model:
     return model
 
 
-def _read_families(fibers: Dictionary) -> tuple[Family, ...]:
+def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:
     model = _read_model(fibers, Model())
     group = fibers.sub("families")
-    families = tuple(_read_family(name, d, model) for name, d in group.subs())
+    families = tuple(_read_family(case, name, d, model) for name, d in group.subs())
     if not families:
         raise fibers.fail("families", "is empty: at least one family of fibers is needed")
     return families
 
 
-def _read_family(name: str, d: Dictionary, model: Model) -> Family:
-    beads = d.integer("beads", least=2)
+def _read_family(case: Path, name: str, d: Dictionary, model: Model) -> Family:
+    shape = d.word("shape", SHAPES, "straight")
+    positions = None
+    if shape == "file":
+        positions = _read_positions(case, d)
+        count, beads = positions.shape[:2]
+        length = beads * float(np.linalg.norm(positions[0, 1] - positions[0, 0]))
+        seed = 0
+    else:
+        count, beads = d.integer("count", least=1), d.integer("beads", least=2)
+        length = _read_length(d, beads)
+        seed = d.integer("seed", 1, least=0)
+    stiffness = _read_stiffness(d, length / beads)
+    family = Family(name, count, beads, length, stiffness, seed, shape, _read_model(d, model), positions)
+    d.done()
+    return family
+
+
+def _read_positions(case: Path, d: Dictionary) -> np.ndarray:
+    path = case / d.word("positions")
+    try:
+        positions = np.load(path, allow_pickle=False).astype(float)
+    except (OSError, ValueError) as error:
+        raise d.fail("positions", f"names {path}, which cannot be read as a NumPy .npy file: {error}") from None
+    if positions.ndim != 3 or positions.shape[1] < 2 or positions.shape[2] != 3:
+        raise d.fail("positions", f"has shape {positions.shape}; (fibers, beads, 3) with 2 beads or more is needed")
+    return positions
+
+
+def _read_length(d: Dictionary, beads: int) -> float:
     length = d.number("length", None, above=0)
     radius = d.number("radius", None, above=0)
     if (length is None) == (radius is None):
         raise CaseError(f"{d.where}: exactly one of the entries 'length' (2 a N) and 'radius' (a) is needed")
-    length = length if length is not None else 2 * radius * beads
+    return length if length is not None else 2 * radius * beads
+
+
+def _read_stiffness(d: Dictionary, diameter: float) -> float:
     stiffness = d.number("bendingStiffness", None, least=0)
     modulus = d.number("youngModulus", None, least=0)
     if (stiffness is None) == (modulus is None):
         raise CaseError(
             f"{d.where}: exactly one of the entries 'bendingStiffness' (K^b) and 'youngModulus' is needed"
         )
-    if stiffness is None:
-        stiffness = modulus * math.pi * (length / beads) ** 4 / 64  # eq. (10): K^b = E pi d^4/64
-    family = Family(
-        name=name,
-        count=d.integer("count", least=1),
-        beads=beads,
-        length=length,
-        bending_stiffness=stiffness,
-        seed=d.integer("seed", 1, least=0),
-        shape=d.word("shape", SHAPES, "straight"),
-        model=_read_model(d, model),
-    )
-    d.done()
-    return family
+    return stiffness if stiffness is not None else modulus * math.pi * diameter**4 / 64  # eq. (10)
 
 
 def _read_coupling(fibers: Dictionary) -> Coupling:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..case.dictionary import CaseError
 from ..case.scene import Family, Scene
 from ..fiber import Fibers, Stepper
 from ..case.times import STATE_FILE
@@ -33,15 +34,20 @@ class Fleet:
 
     @classmethod
     def seeded(cls, scene: Scene, box_min, box_max, time: float) -> Fleet:
-        """New fibers at random places and orientations in the box."""
+        """New fibers, at random places and orientations in the box unless the case gives their positions."""
         size = np.subtract(box_max, box_min)
         steppers = []
         for f in scene.families:
             words = {"bending_torque": f.model.bending_torque, "curvature_law": f.model.curvature_law}
             made_of = (f.bending_stiffness, scene.dynamic_viscosity)
-            fibers = Fibers.straight(f.count, f.beads, f.length, *made_of, box=size, seed=f.seed, **words)
-            if np.any(box_min):
-                fibers = Fibers(fibers.positions + box_min, *made_of, **words)
+            positions = f.positions
+            if positions is None:
+                straight = Fibers.straight(f.count, f.beads, f.length, *made_of, box=size, seed=f.seed)
+                positions = straight.positions + box_min
+            try:
+                fibers = Fibers(positions, *made_of, **words)
+            except ValueError as error:
+                raise CaseError(f"family {f.name} in constant/fiberProperties: {error}") from None
             steppers.append(
                 Stepper(
                     fibers,

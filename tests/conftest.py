@@ -1,0 +1,128 @@
+"""Small cases made from the default one, and real OpenFOAM runs of them."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from gbm_plugin.case.openfoam import environment
+from gbm_plugin.case.prepare import initial_fields, utility
+from gbm_plugin.case.scene import read_scene
+
+DEFAULT_CASE = Path(__file__).parents[1] / "openfoam_case"
+
+# solver tolerances at which runs on different ranks can be compared
+TIGHT = """solvers
+{
+    "p|pFinal" { solver PCG; preconditioner DIC; tolerance 1e-12; relTol 0; maxIter 5000; }
+    "U|UFinal" { solver PBiCGStab; preconditioner DILU; tolerance 1e-12; relTol 0; }
+}
+PIMPLE { momentumPredictor yes; nOuterCorrectors 1; nCorrectors 2; pRefCell 0; pRefValue 0; }
+"""
+
+HEADER = "FoamFile { version 2.0; format ascii; class dictionary; object dictionary; }\n"
+
+# a family that crosses faces of the box and of ranks within a few steps
+FIBERS = """{coupling}
+recordInterval 1;
+interpolation {interpolation};
+integrator {integrator};
+families {{ {families} }}
+"""
+FAMILY = "test { count 12; beads 6; length 1.2; bendingStiffness 1e-4; seed 3; }"
+
+
+def set_entry(path: Path, name: str, value: str) -> None:
+    """Replace the value of an entry that stands at the start of a line."""
+    text, found = re.subn(
+        rf"^(\s*){re.escape(name)}(\s+)[^;]*;", rf"\g<1>{name}\g<2>{value};", path.read_text(), flags=re.M
+    )
+    assert found, f"{name} is not in {path}"
+    path.write_text(text)
+
+
+def make_case(
+    path: Path,
+    *,
+    cells: int = 16,
+    steps: int = 20,
+    time_step: float = 0.02,
+    write_every: int = 10,
+    transport: str = "socket",
+    timeout: float = 60,
+    interpolation: str = "trilinear",
+    integrator: str = "ab3",
+    families: str = FAMILY,
+    fv_options: str | None = None,
+    initial: str | None = None,
+    tight: bool = True,
+    prepared: bool = True,
+) -> Path:
+    """A small copy of the default case: the same dictionaries, other numbers."""
+    path.mkdir(parents=True)
+    for folder in ("0.orig", "constant", "system"):
+        shutil.copytree(DEFAULT_CASE / folder, path / folder, ignore=shutil.ignore_patterns("polyMesh"))
+    control = path / "system/controlDict"
+    set_entry(control, "deltaT", repr(time_step))
+    set_entry(control, "endTime", repr(steps * time_step))
+    set_entry(control, "writeInterval", str(write_every))
+    set_entry(path / "system/blockMeshDict", "n", str(cells))
+    set_entry(path / "system/initialFieldDict", "maxWavenumber", "4")
+    if tight:
+        (path / "system/fvSolution").write_text(HEADER + TIGHT)
+    if fv_options is not None:
+        (path / "constant/fvOptions").write_text(HEADER + fv_options)
+    if initial is not None:
+        (path / "system/initialFieldDict").write_text(HEADER + initial)
+    coupling = f"coupling {{ transport {transport}; timeout {timeout:g}; }}"
+    words = FIBERS.format(
+        coupling=coupling, interpolation=interpolation, integrator=integrator, families=families
+    )
+    (path / "constant/fiberProperties").write_text(HEADER + words)
+    if prepared:
+        utility(path, "blockMesh")
+        initial_fields(read_scene(path))
+    return path
+
+
+@pytest.fixture
+def case(tmp_path) -> Callable[..., Path]:
+    """make_case in a folder of its own; several by giving names."""
+
+    def make(name: str = "case", **options) -> Path:
+        return make_case(tmp_path / name, **options)
+
+    return make
+
+
+def gbm(*arguments: str, **options) -> subprocess.CompletedProcess:
+    """The command line, as a user calls it."""
+    return subprocess.run(
+        [sys.executable, "-m", "gbm_plugin.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        **options,
+    )
+
+
+def run_case(path: Path, *options: str) -> subprocess.CompletedProcess:
+    """`gbm run` that must succeed."""
+    done = gbm("run", path, *options)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def start_solver(path: Path, ranks: int = 1) -> subprocess.Popen:
+    """pimpleFoam alone, its log in log.pimpleFoam."""
+    argv = ["pimpleFoam", "-case", str(path)]
+    if ranks > 1:
+        argv = ["mpirun", "-np", str(ranks), "--oversubscribe", *argv, "-parallel"]
+    with (path / "log.pimpleFoam").open("w") as log:
+        return subprocess.Popen(argv, env=environment(), stdout=log, stderr=subprocess.STDOUT)

@@ -1,0 +1,50 @@
+"""The daemon's side of the protocol with positions that the test chooses: what OpenFOAM samples there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from conftest import start_solver
+from gbm_plugin.case.scene import read_scene
+from gbm_plugin.coupling.channel import listen
+from gbm_plugin.coupling.message import (
+    Hello,
+    Kind,
+    Message,
+    decode_sample,
+    encode_array,
+    encode_welcome,
+)
+
+
+def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
+    """Run the solver to its end with beads that stay at positions (B, 3).
+
+    Returns what it said of itself, and {step: (time, velocity, extra)}.
+    """
+    scene = read_scene(case)
+    samples = {}
+    solver = start_solver(case, ranks)
+    try:
+        with listen(case, scene.coupling) as listener:
+            channel = listener.accept(lambda: solver.poll() is not None)
+            assert channel is not None, (case / "log.pimpleFoam").read_text()[-3000:]
+            first = channel.receive()
+            hello = Hello.decode(first.payload)
+            channel.send(Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1)])))
+            step = first.step
+            while True:
+                channel.send(Message(Kind.POSITIONS, step, 0.0, encode_array(positions)))
+                message = channel.receive()
+                if message.kind is Kind.SAVE:
+                    message = channel.receive()
+                if message.kind is Kind.END:
+                    channel.send(Message(Kind.GOODBYE, message.step, message.time))
+                    break
+                samples[step] = (message.time, *decode_sample(message, len(positions), need))
+                step += 1
+            channel.close()
+        assert solver.wait(30) == 0, (case / "log.pimpleFoam").read_text()[-3000:]
+    finally:
+        solver.kill()
+    return hello, samples
