@@ -35,7 +35,7 @@ def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Pat
         file = pieces / f"fibers_{row:06d}.vtu"
         polyline_mesh(recording, row, wrapped).write(file)
         ElementTree.SubElement(
-            collection, "DataSet", timestep=repr(float(time)), part="0", file=f"{name}/{file.name}"
+            collection, "DataSet", timestep=f"{time:.12g}", part="0", file=f"{name}/{file.name}"
         )
     ElementTree.indent(root)
     path = Path(folder) / f"fibers_{name}.pvd"
