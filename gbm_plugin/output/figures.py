@@ -51,8 +51,9 @@ def spectrum_figure(
     if known:
         compensated = spectrum * k ** (5 / 3) * dissipation ** (-2 / 3)
         panels[1].loglog(k * length, compensated, "o-", markersize=3.5, color=COLOURS[0])
-        panels[1].axhline(_KOLMOGOROV, color="0.45", linewidth=1, linestyle="--", label=f"{_KOLMOGOROV}")
-        panels[1].legend(title="inertial range", loc="lower left")
+        label = f"E = {_KOLMOGOROV} ε$^{{2/3}}$ k$^{{-5/3}}$"
+        panels[1].axhline(_KOLMOGOROV, color="0.45", linewidth=1, linestyle="--", label=label)
+        panels[1].legend(loc="lower left")
         panels[1].set(xlabel="k η", ylabel="E(k) k$^{5/3}$ ε$^{-2/3}$")
     figure.suptitle(f"t = {time:g} s", fontsize=11)
     return figure

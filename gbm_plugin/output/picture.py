@@ -21,10 +21,12 @@ _HUES = (
     ("#ffd9a0", "#E0640A", "#4a1500"),
     ("#a5ecd0", "#009E73", "#00291d"),
     ("#f7c9e2", "#C4559A", "#3d0a2c"),
+    ("#e3e3e3", "#7a7a7a", "#101010"),
+    ("#fff3a6", "#d9b800", "#574600"),
 )
 _FLOW = LinearSegmentedColormap.from_list("flow", ["#ffffff", "#dfe3ea", "#aab2c3", "#7d879f"])
 _POINTS_PER_LINK = 6
-_MOST_FIBERS = 160  # more hide each other
+_MOST_FIBERS = 200  # more hide each other
 _THINNEST = 1.1  # points; thinner fibers are drawn this thick
 
 
@@ -54,11 +56,12 @@ def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | N
     family. flow: values (nx, ny, nz) at the cell centres and their label, shown on the faces behind.
     """
     origin, size = recording.box_origin, recording.box_size
-    families = list(recording.families.values())
+    families = list(recording.families.values())[: len(_HUES)]
     camera = Camera(origin, size)
-    figure = new_figure(7.8, 6.4)
-    bars = len(families) + (flow is not None)
-    grid = figure.add_gridspec(bars, 2, width_ratios=[1, 0.024], wspace=0.02, hspace=0.06)
+    figure = new_figure(8.2, 6.4)
+    grid = figure.add_gridspec(
+        len(families) + (flow is not None), 3, width_ratios=[1, 0.024, 0.13], wspace=0.02, hspace=0.06
+    )
     axes = figure.add_subplot(grid[:, 0])
     flat, _ = camera(origin + size * np.indices((2, 2, 2)).reshape(3, -1).T)
     margin = 0.01 * np.ptp(flat, axis=0).max()
@@ -66,7 +69,7 @@ def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | N
     axes.set(ylim=(flat[:, 1].min() - margin, flat[:, 1].max() + margin), aspect="equal")
     axes.axis("off")
 
-    shapes, mappables, notes = [], [], []
+    shapes, mappables, bars = [], [], []
     for number, family in enumerate(families):
         positions = family.positions[row]
         shown = min(family.count, max(_MOST_FIBERS // len(families), 1))
@@ -75,18 +78,21 @@ def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | N
         scale = Normalize(0, max(np.percentile(kappa, 98), 1e-12), clip=True)
         mappables.append(ScalarMappable(scale, colours))
         shapes.append((family.radius, positions[:shown], kappa[:shown]))
-        _bar(figure, grid[number, 1], mappables[-1], f"{family.name}: curvature [1/m]", extend="max")
-        notes.append(f"{family.name}: {shown} of {family.count} fibers")
+        label = f"{family.name}\n{shown} of {family.count} fibers"
+        bars.append(_bar(figure, grid[number, 1], mappables[-1], label, extend="max"))
     if flow is not None:
         _bar(figure, grid[-1, 1], _draw_faces(axes, camera, origin, size, flow[0]), flow[1])
-    title = axes.set_title(" ", fontsize=10, color="0.25")
+    title = f"t = {recording.times[row]:g} s,  colour: curvature [1/m]"
+    if len(families) < len(recording.families):
+        title += f",  {len(families)} of {len(recording.families)} families"
+    axes.set_title(title, fontsize=10, color="0.25")
 
     figure.draw_without_rendering()  # lays out the axes, which says how many points a metre has
     figure.set_layout_engine("none")
     points_per_metre = axes.transData.get_matrix()[0, 0] * 72 / figure.dpi
-    thin = [2 * radius * points_per_metre < _THINNEST for radius, _, _ in shapes]
-    notes = [note + (", drawn too thick" if t else "") for note, t in zip(notes, thin, strict=True)]
-    title.set_text("     ".join([f"t = {recording.times[row]:g} s", *notes]))
+    for (radius, _, _), bar in zip(shapes, bars, strict=True):
+        if 2 * radius * points_per_metre < _THINNEST:
+            bar.set_title(bar.get_title(loc="left") + "\n(drawn too thick)", fontsize=8, loc="left")
     strokes = [
         _strokes(camera, *shape, mappable, origin, size)
         for shape, mappable in zip(shapes, mappables, strict=True)
@@ -97,12 +103,13 @@ def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | N
     return figure
 
 
-def _bar(figure: Figure, cell, mappable: ScalarMappable, label: str, extend: str = "neither") -> None:
+def _bar(figure: Figure, cell, mappable: ScalarMappable, label: str, extend: str = "neither") -> Axes:
     bar = figure.colorbar(mappable, cax=figure.add_subplot(cell), extend=extend)
-    bar.set_label(label, fontsize=9)
+    bar.ax.set_title(label, fontsize=8, loc="left")
     bar.ax.tick_params(labelsize=8)
     bar.ax.locator_params(nbins=5)
     bar.outline.set_visible(False)
+    return bar.ax
 
 
 def _smooth(radius: float, positions: NDArray, kappa: NDArray) -> NDArray:
