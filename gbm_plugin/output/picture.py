@@ -75,7 +75,7 @@ def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | N
         shown = min(family.count, max(_MOST_FIBERS // len(families), 1))
         kappa = bead_curvature(positions, family.radius)
         colours = LinearSegmentedColormap.from_list(family.name, _HUES[number % len(_HUES)])
-        scale = Normalize(0, max(np.percentile(kappa, 98), 1e-12), clip=True)
+        scale = Normalize(0, max(np.percentile(kappa, 98), 1e-3 / family.radius), clip=True)
         mappables.append(ScalarMappable(scale, colours))
         shapes.append((family.radius, positions[:shown], kappa[:shown]))
         label = f"{family.name}\n{shown} of {family.count} fibers"
@@ -149,7 +149,8 @@ def _strokes(
 def _draw_strokes(axes: Axes, strokes: list, points_per_metre: float, size: NDArray) -> None:
     """From back to front: a dark rim, the body, a highlight; what is far fades."""
     ends, near, width, taper, colour = (np.concatenate(part) for part in zip(*strokes, strict=True))
-    order = np.argsort(near)
+    # equally near pieces keep their order along the fiber
+    order = np.argsort(np.round(near / np.linalg.norm(size), 6), kind="stable")
     ends, near, colour = ends[order], near[order], colour[order]
     width = (np.maximum(width * points_per_metre, _THINNEST) * taper)[order]
     depth = np.clip(0.5 - near / np.linalg.norm(size), 0, 1)[:, None]
@@ -157,13 +158,13 @@ def _draw_strokes(axes: Axes, strokes: list, points_per_metre: float, size: NDAr
     rim, light = 0.45 * body, body + 0.55 * (1 - body)
     along = ends[:, 1] - ends[:, 0]
     length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
-    reach = 0.3 * (width / points_per_metre)[:, None] * along / length  # no gaps where pieces meet
+    reach = 0.15 * (width / points_per_metre)[:, None] * along / length  # no gaps where pieces meet
     longer = np.stack([ends[:, 0] - reach, ends[:, 1] + reach], axis=1)
     shift = (width / points_per_metre)[:, None, None] * np.array([-0.13, 0.2])
     axes.add_collection(
         LineCollection(
             np.stack([ends, longer, longer + shift], axis=1).reshape(-1, 2, 2),
-            linewidths=(width[:, None] + np.array([0.9, 0, 0])).ravel() * np.tile([1, 1, 0.3], len(width)),
+            linewidths=np.stack([width, np.maximum(width - 0.9, 0.7 * width), 0.3 * width], axis=1).ravel(),
             colors=np.stack([rim, body, light], axis=1).reshape(-1, 3),
             capstyle="butt",
             rasterized=True,
