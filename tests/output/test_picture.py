@@ -1,7 +1,7 @@
 import matplotlib.image
 import numpy as np
-from conftest import BOX, SCENE
 from matplotlib.collections import QuadMesh
+from sample_records import BOX, SCENE
 
 from gbm_plugin.output.picture import Camera, fibers_picture
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording

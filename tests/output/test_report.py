@@ -4,7 +4,6 @@ import shutil
 
 import numpy as np
 import pytest
-from conftest import BOX, FAMILIES, SCENE, records
 from fake_case import (
     BLOCK_MESH,
     bent_fibers,
@@ -14,6 +13,7 @@ from fake_case import (
     write_mesh,
     write_velocity,
 )
+from sample_records import BOX, FAMILIES, SCENE, records
 
 from gbm_plugin.output import field
 from gbm_plugin.output.recording import Recorder, open_recording

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from conftest import BOX, FAMILIES, SCENE, records
+from sample_records import BOX, FAMILIES, SCENE, records
 
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
 from gbm_plugin.output.series import cut_at_faces, write_series
