@@ -35,7 +35,9 @@ def box_mesh(case: Path | str) -> tuple[tuple[int, int, int], NDArray[np.float64
     origin, size = points.min(axis=0), np.ptp(points, axis=0)
     planes = [np.unique(np.round((points[:, i] - origin[i]) / size[i], 9)) for i in range(3)]
     cells = tuple(len(plane) - 1 for plane in planes)
-    uniform = all(np.allclose(np.diff(plane), 1 / n, rtol=1e-5) for plane, n in zip(planes, cells, strict=True))
+    uniform = all(
+        np.allclose(np.diff(plane), 1 / n, rtol=1e-5) for plane, n in zip(planes, cells, strict=True)
+    )
     owner, neighbour = (
         np.asarray(OpenFoamFile(str(folder), name=name, verbose=False).values, dtype=np.int64)
         for name in ("owner", "neighbour")
@@ -49,7 +51,7 @@ def box_mesh(case: Path | str) -> tuple[tuple[int, int, int], NDArray[np.float64
 
 
 def read_velocity(case: Path | str, time: str, cells: tuple[int, int, int]) -> NDArray[np.float64]:
-    """U at a time folder through fluidfoam: (3, nx, ny, nz) [m/s]. Raises ValueError for another cell count."""
+    """U of a time folder through fluidfoam, (3, nx, ny, nz) [m/s]. Raises ValueError for another count."""
     values = fluidfoam.readvector(str(case), time, "U", verbose=False)
     values = values.reshape(3, -1)
     if values.shape[1] == 1:  # a uniform field

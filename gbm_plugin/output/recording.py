@@ -16,6 +16,7 @@ from .transaction import Transaction
 
 __all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open_recording"]
 
+
 class Positions:
     """Positions (S, F, N, 3) [m] of one family, read from the files when indexed; numpy's basic indexing."""
 

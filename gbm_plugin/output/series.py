@@ -21,8 +21,8 @@ def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Pat
 
     wrapped: every fiber cut at the faces of the periodic box and each piece shifted into it; otherwise fibers
     are whole, where they were carried. Point data: family (its number), fiber, bead (indices in the family;
-    bead is fractional at a cut) and curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two beads).
-    Replaces a series that is there. Raises OSError if it cannot be written.
+    bead is fractional at a cut) and curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two
+    beads). Replaces a series that is there. Raises OSError if it cannot be written.
     """
     name = "wrapped" if wrapped else "unwrapped"
     pieces = Path(folder) / name
@@ -35,7 +35,7 @@ def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Pat
         file = pieces / f"fibers_{row:06d}.vtu"
         polyline_mesh(recording, row, wrapped).write(file)
         ElementTree.SubElement(
-            collection, "DataSet", timestep=repr(float(time)), part="0", file=f"{name}/{file.name}"
+            collection, "DataSet", timestep=f"{time:.12g}", part="0", file=f"{name}/{file.name}"
         )
     ElementTree.indent(root)
     path = Path(folder) / f"fibers_{name}.pvd"
@@ -49,7 +49,9 @@ def polyline_mesh(recording: Recording, row: int, wrapped: bool) -> meshio.Mesh:
     for number, family in enumerate(recording.families.values()):
         positions = family.positions[row]
         fiber, bead = np.indices(positions.shape[:2], dtype=float)
-        values = np.stack([np.full_like(bead, number), fiber, bead, bead_curvature(positions, family.radius)], axis=-1)
+        values = np.stack(
+            [np.full_like(bead, number), fiber, bead, bead_curvature(positions, family.radius)], axis=-1
+        )
         chains = np.concatenate([positions, values], axis=-1)
         nodes, links = (
             cut_at_faces(chains, recording.box_origin, recording.box_size) if wrapped else _whole(chains)
@@ -88,9 +90,9 @@ def _whole(chains: NDArray) -> tuple[NDArray, NDArray]:
 def cut_at_faces(chains: NDArray, origin: ArrayLike, size: ArrayLike) -> tuple[NDArray, NDArray]:
     """Cut chains at the faces of the periodic box and shift each piece into it.
 
-    chains (F, N, 3 + V): positions and V values along; origin, size (3,). A link that crosses a face is divided
-    there, with linearly interpolated values; both ends of the cut become points, one on either face. Returns
-    points (P, 3 + V) in the box and links (M, 2).
+    chains (F, N, 3 + V): positions and V values along; origin, size (3,). A link that crosses a face is
+    divided there, with linearly interpolated values; both ends of the cut become points, one on either face.
+    Returns points (P, 3 + V) in the box and links (M, 2).
     """
     origin, size = np.asarray(origin, dtype=float), np.asarray(size, dtype=float)
     beads = chains.shape[1]

@@ -58,7 +58,7 @@ class Arrays:
             full = self.xp.zeros((n, n, n // 2 + 1), self.complex)
             for stored, place in self.modes.blocks():
                 full[place][..., : cut + 1] = source[stored]
-            target[:] = self.xp.fft.irfftn(full, s=(n, n, n), norm="forward")
+            target[:] = self.xp.fft.irfftn(full, s=(n, n, n), axes=(0, 1, 2), norm="forward")
         return out
 
     def project(self, f: Array) -> Array:
@@ -84,7 +84,7 @@ class Arrays:
         out[:] = self.project(self.real.type(linear) * u - 1j * divergence)
 
     def combine(self, out: Array, terms: list[Term]) -> float:
-        """out = sum of coefficient exp(-nu k^2 delay) modes over the terms; returns its fluctuation energy."""
+        """out = sum of coefficient exp(-nu k^2 delay) modes over terms; returns its fluctuation energy."""
         k_squared = self.xp.asarray(self.modes.k_squared)
         total = sum(
             (c * self.xp.exp(-self.viscosity * k_squared * t)).astype(self.real) * a for c, t, a in terms

@@ -38,9 +38,11 @@ class Slabs(Arrays):
         self._rows = modes.rows
 
     def nonlinear(self, u, out, linear=0.0, want_speed=False):
-        n, mixed, scale = self.modes.cells, self._mixed, self.real.type(1 / self.modes.cells**3)
+        n, mixed, scale = self.modes.cells, self._mixed, self.real.type(0.5 / self.modes.cells**3)
         kx, ky, kz = self._k
+        kz = np.repeat(kz, 2)  # real and imaginary part
         linear = self.real.type(linear)
+        source, target = u.view(self.real), out.view(self.real)
         speeds = [0.0] * self.threads
 
         def multiply(worker, first, planes):
@@ -52,12 +54,13 @@ class Slabs(Arrays):
                 speeds[self._workers.index(worker)] = max(speeds[self._workers.index(worker)], speed)
             kernels.products(view, 2 * n)
             worker.forward(len(planes))
-            kernels.unpack(planes, mixed, first, self._rows, scale)
+            kernels.unpack(planes, mixed, first, self._rows)
 
         def finish(worker, j):
-            worker.columns[:] = mixed[:, :, j]
+            worker.columns[..., : mixed.shape[3]] = mixed[:, :, j]
             worker.forward_x.execute()
-            kernels.project(worker.columns, u[:, :, j], out[:, :, j], self._rows, kx, ky[j], kz, linear)
+            products = worker.columns.view(self.real)
+            kernels.project(products, source, target, j, self._rows, kx, ky, kz, scale, linear, worker.row)
 
         self._to_mixed(u)
         self._each_block(multiply)
@@ -105,12 +108,19 @@ class Slabs(Arrays):
         mean = out[:, 0, 0, 0].astype(complex)
         return 0.5 * float(energy.sum() - (mean * mean.conj()).real.sum())
 
+    def memory(self) -> int:
+        """Bytes of the velocity, three slopes of the AB3 scheme and all work space."""
+        state = 4 * 3 * np.prod(self.modes.shape) * self.complex.itemsize
+        return int(
+            state + self._mixed.nbytes + sum(w.columns.nbytes + w.planes.nbytes for w in self._workers)
+        )
+
     def _to_mixed(self, u: np.ndarray) -> None:
         """Points in x, modes in y and z, of three fields."""
         cut, mixed = self.modes.cut, self._mixed
 
         def column(worker, j):
-            buffer = worker.columns[:3]
+            buffer = worker.columns[:3, :, : cut + 1]
             buffer[:, : cut + 1] = u[:, : cut + 1, j]
             buffer[:, cut + 1 : -cut] = 0
             buffer[:, -cut:] = u[:, cut + 1 :, j]
@@ -147,21 +157,22 @@ class _Worker:
         n, cut = modes.cells, modes.cut
         width = n + 64 // kind.itemsize  # rows a power of two apart would fight for the same cache lines
         pairs = min(n // 2, max(1, BLOCK // (5 * n * width * kind.itemsize)))
-        self.columns = pyfftw.zeros_aligned((5, n, cut + 1), kind)
+        kept = min(-(-(cut + 1) // 4) * 4, n // 2)  # kz = 0 ... K, and a few more for whole vector registers
+        self.columns = pyfftw.zeros_aligned((5, n, kept), kind)
+        self.row = np.empty((3, 2 * cut + 2), real)
         self.planes = pyfftw.zeros_aligned((pairs, 5, n, width), kind)
         self.inverse_x = _plan(self.columns[:3], 1, "FFTW_BACKWARD")
         self.forward_x = _plan(self.columns, 1, "FFTW_FORWARD")
         self._plans: dict[int, tuple[list, list]] = {}
-        self._cut, self._n = cut, n
+        self._edges, self._n = (slice(0, kept), slice(n - kept, n)), n
 
     def _for(self, pairs: int) -> tuple[list, list]:
         if pairs not in self._plans:
-            z, n, cut = self.planes[:pairs, ..., : self._n], self._n, self._cut
-            edges = (slice(0, cut + 1), slice(n - cut, n))  # the kz that are kept
+            z = self.planes[:pairs, ..., : self._n]
 
             def along(fields, direction):
                 part = z[:, :fields]
-                return [_plan(part[..., e], 2, direction) for e in edges], _plan(part, 3, direction)
+                return [_plan(part[..., e], 2, direction) for e in self._edges], _plan(part, 3, direction)
 
             y, rows = along(3, "FFTW_BACKWARD")
             inverse = [*y, rows]

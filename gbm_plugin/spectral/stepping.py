@@ -79,7 +79,7 @@ class AdamsBashforth3:
 
 
 def adams_bashforth_weights(ages: list[float], h: float) -> NDArray:
-    """Weights b_j: sum b_j g(-age_j) = int_0^h g(s) ds for quadratic g; h (23, -16, 5)/12 at ages 0, h, 2h."""
+    """Weights b_j: sum b_j g(-age_j) = int_0^h g(s) ds for quadratic g; equal steps: h (23, -16, 5)/12."""
     powers = np.arange(len(ages))
     scaled = -np.asarray(ages) / h
     return h * np.linalg.solve(scaled ** powers[:, None], 1 / (powers + 1))

@@ -6,7 +6,9 @@ summed to the first lag M >= 5 tau (Sokal 1997, "Monte Carlo methods in statisti
 bias of the cut is exp(-5) for an exponential correlation while the noise of the tail is left out.
 """
 
+import csv
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,6 +82,62 @@ def batch_means(series: ArrayLike, batches: int = 20) -> tuple[float, float]:
         raise ValueError(f"batches must lie in 2 ... {series.size}, got {batches}")
     blocks = series[series.size % batches :].reshape(batches, -1).mean(axis=1)
     return float(blocks.mean()), float(blocks.std(ddof=1) / np.sqrt(batches))
+
+
+class TimeSeries:
+    """Quantities recorded at equal intervals of time, with their running averages.
+
+    `record` adds one line, `mean` averages what lies at or after a time; `write` and `read`
+    are a CSV file with the columns time, name, name, ...
+    """
+
+    def __init__(self) -> None:
+        self.columns: dict[str, list[float]] = {}
+
+    def record(self, time: float, values: dict[str, float]) -> None:
+        """Add the values at a time; the names are those of the first record."""
+        line = {"time": time} | values
+        if self.columns and line.keys() != self.columns.keys():
+            raise ValueError(f"recorded are {', '.join(self.columns)}, given {', '.join(line)}")
+        for name, value in line.items():
+            self.columns.setdefault(name, []).append(float(value))
+
+    def __len__(self) -> int:
+        return len(self.columns.get("time", ()))
+
+    def __getitem__(self, name: str) -> NDArray:
+        """All values of a quantity, or "time"."""
+        return np.array(self.columns[name])
+
+    def mean(self, name: str, since: float = -np.inf) -> Mean:
+        """Average of a quantity from time `since` on, with its standard error."""
+        time = self["time"]
+        kept = time >= since
+        if kept.sum() < 2:
+            raise ValueError(f"fewer than two samples at or after t = {since:g}")
+        return mean(self[name][kept], spacing=float(np.diff(time[kept]).mean()))
+
+    def until(self, time: float) -> "TimeSeries":
+        """The part up to and including a time."""
+        part, kept = TimeSeries(), self["time"] <= time
+        part.columns = {name: self[name][kept].tolist() for name in self.columns}
+        return part
+
+    def write(self, path: Path | str) -> None:
+        """Write a CSV file."""
+        with open(path, "w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(self.columns)
+            writer.writerows(zip(*([f"{v:.10g}" for v in c] for c in self.columns.values()), strict=True))
+
+    @classmethod
+    def read(cls, path: Path | str) -> "TimeSeries":
+        """Read what `write` wrote."""
+        with open(path, newline="") as file:
+            names, *lines = csv.reader(file)
+        series = cls()
+        series.columns = {name: [float(line[i]) for line in lines] for i, name in enumerate(names)}
+        return series
 
 
 def _checked(series: ArrayLike) -> NDArray:

@@ -12,7 +12,16 @@ from gbm_plugin.output.recording import FamilyRecord, Recorder
 BOX = 2 * np.pi
 NU = 1e-3
 BLOCK_MESH = shutil.which("blockMesh")
-_HEADER = 'FoamFile\n{{\n    version 2.0;\n    format ascii;\n    class {kind};\n    location "{place}";\n    object {name};\n}}\n\n'
+_HEADER = """FoamFile
+{{
+    version     2.0;
+    format      ascii;
+    class       {kind};
+    location    "{place}";
+    object      {name};
+}}
+
+"""
 
 
 def write_mesh(case: Path, cells: int) -> None:
@@ -43,7 +52,7 @@ def write_mesh(case: Path, cells: int) -> None:
 
 
 def random_flow(cells: int, seed: int = 0) -> np.ndarray:
-    """Divergence-free random field (3, n, n, n) with a model spectrum, at the cell centres of its own grid."""
+    """Divergence-free random field (3, n, n, n) with a model spectrum, at the cell centres."""
     random = np.random.default_rng(seed)
     k = np.stack(np.meshgrid(*[np.fft.fftfreq(cells, 1 / cells)] * 3, indexing="ij"))
     magnitude = np.sqrt((k**2).sum(axis=0))
@@ -74,7 +83,8 @@ def write_forcing_table(case: Path, start: float, times: np.ndarray) -> None:
     epsilon = 0.09 + 0.02 * np.sin(1.3 * times - 0.9)
     rms = np.sqrt(2 * k / 3)
     columns = dict(
-        Time=times, k=k, epsilonBudget=epsilon, epsilonGradient=0.9 * epsilon, epsilonLaplacian=0.97 * epsilon,
+        Time=times, k=k,
+        epsilonBudget=epsilon, epsilonGradient=0.9 * epsilon, epsilonLaplacian=0.97 * epsilon,
         uPrime=rms, ReLambda=rms * np.sqrt(15 * NU * rms**2 / epsilon) / NU, eta=(NU**3 / epsilon) ** 0.25,
         A=epsilon / (2 * k), power=epsilon, meanUx=1e-17 + 0 * k, meanUy=0 * k, meanUz=-2e-17 + 0 * k,
     )  # fmt: skip
@@ -100,9 +110,14 @@ def bent_fibers(times, count, beads, radius, bend, seed) -> np.ndarray:
     shapes = []
     for time in times:
         mode = np.arange(1, 5)[:, None, None]
-        angle = bend * (1 - np.exp(-time)) * (
-            weight * np.sin(np.pi * mode * s + phase + 0.8 * time * np.array([1, 1.3])[:, None, None, None])
-        ).sum(axis=1)
+        angle = (
+            bend
+            * (1 - np.exp(-time))
+            * (
+                weight
+                * np.sin(np.pi * mode * s + phase + 0.8 * time * np.array([1, 1.3])[:, None, None, None])
+            ).sum(axis=1)
+        )
         theta, tilt = angle
         local = np.stack([np.cos(theta) * np.cos(tilt), np.sin(theta) * np.cos(tilt), np.sin(tilt)], axis=-1)
         links = 2 * radius * np.einsum("fij,fnj->fni", frame, local)
@@ -112,7 +127,7 @@ def bent_fibers(times, count, beads, radius, bend, seed) -> np.ndarray:
 
 
 def make_case(case: Path, cells: int = 16, counts: tuple[int, int] = (12, 12)) -> Path:
-    """Write the whole case: U at time 2, forcing tables and fibers of a run to 2 that was restarted at 1.2."""
+    """Write the whole case: U at time 2, forcing tables and fibers of a run to 2, restarted at 1.2."""
     write_mesh(case, cells)
     write_velocity(case, "2", random_flow(cells))
     write_forcing_table(case, 0, np.arange(0.02, 1.41, 0.02))

@@ -10,7 +10,11 @@ def put(folder, start, text):
 
 
 def test_numbers_and_vectors(tmp_path):
-    put(tmp_path, "0", "# Energy\n# box : 1\n# Time\tk     meanU p\n0.1 1e-3 (1 -2 3e2) 5\n0.2\t2e-3\t(4 5 6)\tnan\n")
+    put(
+        tmp_path,
+        "0",
+        "# Energy\n# box : 1\n# Time\tk     meanU p\n0.1 1e-3 (1 -2 3e2) 5\n0.2\t2e-3\t(4 5 6)\tnan\n",
+    )
     table = read_dat(tmp_path, "some.dat")
     assert list(table) == ["Time", "k", "meanU", "p"]
     np.testing.assert_array_equal(table["meanU"], [[1, -2, 300], [4, 5, 6]])

@@ -10,7 +10,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from conftest import BOX, FAMILIES, SCENE, records
+from sample_records import BOX, FAMILIES, SCENE, records
 
 from gbm_plugin.output import transaction
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording

@@ -1,10 +1,11 @@
+import itertools
 from pathlib import Path
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 import pytest
-from conftest import BOX, FAMILIES, SCENE, records
+from sample_records import BOX, FAMILIES, SCENE, records
 
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
 from gbm_plugin.output.series import cut_at_faces, write_series
@@ -28,7 +29,7 @@ def test_every_time_is_there_and_points_move(series):
     for mesh in meshes:
         assert [block.type for block in mesh.cells] == ["line"]
         assert mesh.points.dtype == np.float64
-    for one, other in zip(meshes[:-1], meshes[1:], strict=True):
+    for one, other in itertools.pairwise(meshes):
         ends = [mesh.points[mesh.point_data["bead"] == 0] for mesh in (one, other)]
         assert np.linalg.norm(ends[0][:4] - ends[1][:4], axis=1).min() > 1e-3
 

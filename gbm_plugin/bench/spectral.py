@@ -1,0 +1,191 @@
+"""Time per right-hand side of the spectral solver, beside fluidsim's ns3d and nine full real transforms.
+
+The rotational form of a pseudo-spectral code needs nine transforms: their time alone is a scale for any of them.
+fluidsim runs in a process of its own (it may live in another environment); the contestants take turns, so that what
+else the machine does meets all of them, and the best of their turns is compared.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pyfftw
+
+from gbm_plugin.spectral import SpectralSolver
+
+PEER = """
+import os, sys, time
+import numpy as np
+n, threads = int(sys.argv[1]), int(sys.argv[2])
+answers, sys.stdout = sys.stdout, sys.stderr
+from fluidsim.solvers.ns3d.solver import Simul
+import fluidsim
+def simulation(fft):
+    p = Simul.create_default_params()
+    p.output.HAS_TO_SAVE = False
+    p.oper.nx = p.oper.ny = p.oper.nz = n
+    p.oper.Lx = p.oper.Ly = p.oper.Lz = 2 * np.pi
+    p.oper.coef_dealiasing = 2 / 3
+    p.oper.type_fft = fft
+    p.nu_2 = 1e-3
+    p.init_fields.type = "noise"
+    return Simul(p)
+found = {}
+for fft in ["fft3d.with_fftw3d"] * (threads == 1) + ["fft3d.with_pyfftw"]:
+    try:
+        found[fft] = simulation(fft)
+    except Exception as error:
+        print(fft, error, file=sys.stderr)
+if not found:
+    sys.exit("no transform library for fluidsim")
+def once(s):
+    start = time.perf_counter()
+    s.tendencies_nonlin(s.state.state_spect)
+    return time.perf_counter() - start
+for s in found.values():
+    once(s)
+fft = min(found, key=lambda f: min(once(found[f]) for _ in range(3)))
+print(fluidsim.__version__, fft, file=answers, flush=True)
+for line in sys.stdin:
+    print(once(found[fft]), file=answers, flush=True)
+"""
+
+
+class Fluidsim:
+    """fluidsim in another process, one right-hand side per call."""
+
+    def __init__(self, python: str, cells: int, threads: int):
+        self._process = subprocess.Popen(
+            [python, "-c", PEER, str(cells), str(threads)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env=os.environ | {"OMP_NUM_THREADS": str(threads)},
+        )
+        self.name = self._process.stdout.readline().strip()
+
+    def __bool__(self) -> bool:
+        return bool(self.name)
+
+    def __call__(self) -> float:
+        self._process.stdin.write("\n")
+        self._process.stdin.flush()
+        return float(self._process.stdout.readline())
+
+    def close(self) -> None:
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def run(cells: int = 128, threads: int = 1, repeats: int = 9, fluidsim_python: str = sys.executable) -> dict:
+    """Times in seconds, shares and bytes, for double and single precision.
+
+    fluidsim_python: the interpreter that can import fluidsim; where none can, its time is None.
+    """
+    ours = {precision: _right_hand_side(cells, threads, precision) for precision in ("double", "single")}
+    contestants: dict[str, Callable[[], float]] = {}
+    for precision, (solver, rhs) in ours.items():
+        contestants[precision] = rhs
+        contestants[f"{precision}, transforms alone"] = _transforms_alone(solver)
+        contestants[f"{precision}, nine full transforms"] = _full_transforms(cells, threads, precision)
+    peer = Fluidsim(fluidsim_python, cells, threads)
+    if peer:
+        contestants["fluidsim"] = peer
+    best = dict.fromkeys(contestants, np.inf)
+    for _ in range(repeats):
+        for name, once in contestants.items():
+            best[name] = min(best[name], once())
+    peer.close()
+    result = {
+        "cells": cells,
+        "threads": threads,
+        "fluidsim": peer.name or None,
+        "fluidsim_time": best.get("fluidsim"),
+    }
+    for precision, (solver, _) in ours.items():
+        result[precision] = {
+            "time": best[precision],
+            "transform_share": best[f"{precision}, transforms alone"] / best[precision],
+            "nine_full_transforms": best[f"{precision}, nine full transforms"],
+            "bytes_per_point": solver.operators.memory() / cells**3,
+            "times_faster_than_fluidsim": best["fluidsim"] / best[precision] if peer else None,
+        }
+    return result
+
+
+def table(result: dict) -> str:
+    """The result of `run` as text."""
+    lines = [
+        f"one right-hand side at {result['cells']}^3, {result['threads']} thread(s)",
+        f"{'':10s}{'ms':>8s}{'in FFTs':>9s}{'9 real FFTs, ms':>17s}{'bytes/point':>13s}{'fluidsim/this':>15s}",
+    ]
+    for precision in ("double", "single"):
+        r = result[precision]
+        ratio = r["times_faster_than_fluidsim"]
+        lines.append(
+            f"{precision:10s}{1e3 * r['time']:8.1f}{r['transform_share']:9.0%}{1e3 * r['nine_full_transforms']:17.1f}"
+            f"{r['bytes_per_point']:13.0f}{f'{ratio:.2f}' if ratio else '-':>15s}"
+        )
+    if result["fluidsim"]:
+        lines.append(f"fluidsim {result['fluidsim']}, double: {1e3 * result['fluidsim_time']:.1f} ms")
+    else:
+        lines.append("fluidsim was not found")
+    return "\n".join(lines)
+
+
+def _right_hand_side(cells: int, threads: int, precision: str) -> tuple[SpectralSolver, Callable[[], float]]:
+    solver = SpectralSolver(cells, 1e-3, time_step=1e-3, threads=threads, precision=precision)
+    solver.set_velocity(np.random.default_rng(0).standard_normal((3, cells, cells, cells), dtype=np.float32))
+    u = solver.operators.to_modes(solver.velocity)
+    out = solver.operators.zeros()
+    return solver, _timed(lambda: solver.operators.nonlinear(u, out))
+
+
+def _transforms_alone(solver: SpectralSolver) -> Callable[[], float]:
+    """All transforms of one right-hand side, on buffers at rest."""
+    operators = solver.operators
+
+    def columns(worker, start, stop):
+        for _ in range(start, stop):
+            worker.inverse_x.execute()
+            worker.forward_x.execute()
+
+    def planes(worker, first, buffers):
+        worker.inverse(len(buffers))
+        worker.forward(len(buffers))
+
+    def both():
+        operators._share(columns, operators.modes.shape[1])
+        operators._each_block(planes)
+
+    def clean():
+        for worker in operators._workers:
+            worker.columns[:] = 0
+            worker.planes[:] = 0
+        start = time.perf_counter()
+        both()
+        return time.perf_counter() - start
+
+    return clean
+
+
+def _full_transforms(cells: int, threads: int, precision: str) -> Callable[[], float]:
+    real, kind = ("float64", "complex128") if precision == "double" else ("float32", "complex64")
+    a = pyfftw.zeros_aligned((cells,) * 3, real)
+    b = pyfftw.zeros_aligned((cells, cells, cells // 2 + 1), kind)
+    forward = pyfftw.FFTW(a, b, axes=(0, 1, 2), threads=threads, flags=("FFTW_MEASURE",))
+    return _timed(lambda: [forward.execute() for _ in range(9)])
+
+
+def _timed(work: Callable) -> Callable[[], float]:
+    def once() -> float:
+        start = time.perf_counter()
+        work()
+        return time.perf_counter() - start
+
+    once()
+    return once
