@@ -14,8 +14,8 @@ from . import __version__
 def main(argv: list[str] | None = None) -> int:
     parser = _parser()
     arguments = parser.parse_args(argv)
-    logging.basicConfig(level=logging.INFO, format="%(message)s", stream=sys.stdout)
-    logging.getLogger("foam").setLevel(logging.ERROR)
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
+    logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
     from .coupling.channel import CouplingError
     from .run import RunError
 

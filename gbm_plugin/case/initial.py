@@ -78,7 +78,7 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
     head = _binary_header(head)
     target.parent.mkdir(parents=True, exist_ok=True)
     with target.open("wb") as file:
-        file.write(f"{head}internalField   nonuniform List<vector>\n{len(cells)}\n(".encode())
+        file.write(f"{head}internalField   nonuniform List<vector> \n{len(cells)}\n(".encode())
         file.write(np.ascontiguousarray(cells, dtype="<f8").tobytes())
         file.write(f")\n;{tail}".encode())
 

@@ -123,6 +123,9 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
 
     shakeHands(fiberProperties);
 
+    // what was read has old values on the patches between ranks
+    mesh_.lookupObjectRef<volVectorField>(UName_).correctBoundaryConditions();
+
     // The fibers start, or continue, from the flow at this time. Function
     // objects are not executed before the first step.
     exchange();

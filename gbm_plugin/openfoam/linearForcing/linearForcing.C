@@ -220,7 +220,15 @@ void Foam::fv::linearForcing::writeRow
 void Foam::fv::linearForcing::beginStep(const volVectorField& U)
 {
     const scalar deltaT = mesh_.time().deltaTValue();
-    nu_ = kinematicViscosity(mesh_);
+    if (nu_ == 0)
+    {
+        nu_ = kinematicViscosity(mesh_);
+
+        // what was read has old values on the patches between ranks
+        mesh_.lookupObjectRef<volVectorField>(UName_)
+            .correctBoundaryConditions();
+    }
+
     const flowStatistics now(U, nu_);
 
     if (!std::isfinite(now.k))
