@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .case.dictionary import CaseError
-from .case.openfoam import command, environment, fatal_message, utility
-from .case.prepare import prepare, ranks_of
+from .case.openfoam import command, environment, fatal_message
+from .case.prepare import prepare, ranks_of, reconstruct
 from .case.scene import Scene, read_scene
 from .case.times import choose_start
 from .output.progress import Progress
@@ -49,7 +49,7 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
         _remove_addresses(case)
         _Pair(scene, ranks, start.time).run()
         if ranks > 1:
-            utility(case, "reconstructPar", "-newTimes")
+            reconstruct(case)
 
 
 @contextmanager

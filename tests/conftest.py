@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gbm_plugin.case.openfoam import environment
@@ -89,6 +90,24 @@ def make_case(
         utility(path, "blockMesh")
         initial_fields(read_scene(path))
     return path
+
+
+def divide(case: Path, ranks: int, n: tuple | None) -> None:
+    """Decompose a prepared case into n[0] x n[1] x n[2] blocks, or with None into ragged bodies of cells;
+    of a case that is not prepared yet, only say so in decomposeParDict."""
+    d = case / "system/decomposeParDict"
+    set_entry(d, "numberOfSubdomains", str(ranks))
+    if n is None:  # ragged bodies of cells, no planes
+        i, j, k = np.indices(read_scene(case).cells).transpose(0, 3, 2, 1).reshape(3, -1)  # x fastest
+        rank = (i // 5 + j // 3 + (k + i) // 4) % ranks
+        header = "FoamFile { version 2.0; format ascii; class labelList; object ranks; }\n"
+        (case / "constant/ranks").write_text(header + f"{len(rank)}({' '.join(map(str, rank))})\n")
+        set_entry(d, "method", "manual")
+        d.write_text(d.read_text() + 'manualCoeffs { dataFile "ranks"; }\n')
+    else:
+        d.write_text(re.sub(r"n\s+\(1 1 2\);", f"n ({n[0]} {n[1]} {n[2]});", d.read_text()))
+    if (case / "constant/polyMesh").is_dir():
+        utility(case, "decomposePar", "-force")
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from .dictionary import CaseError, Dictionary
 from .initial import read_initial_field, write_velocity
 from .openfoam import utility
 from .scene import Scene
-from .times import Start
+from .times import Start, time_folders
 
 
 def prepare(scene: Scene, start: Start, ranks: int) -> None:
@@ -53,13 +53,20 @@ def ranks_of(case: Path, parallel: bool) -> int:
     return Dictionary.read(case, "system/decomposeParDict").integer("numberOfSubdomains", least=1)
 
 
+def reconstruct(case: Path) -> None:
+    """The time folders of a decomposed run that are not yet in the case itself."""
+    decomposed = {name for name in time_folders(case).values() if (case / "processor0" / name / "U").is_file()}
+    if any(not (case / name).is_dir() for name in decomposed):
+        utility(case, "reconstructPar", "-newTimes")
+
+
 def _decompose(case: Path, start: Start, ranks: int) -> None:
     """Make the folders that this number of ranks reads, from those that are there; none is lost."""
     present = len(list(case.glob("processor[0-9]*")))
     if present == (ranks if ranks > 1 else 0):
         return
     if present and start.continues:
-        utility(case, "reconstructPar", "-newTimes")
+        reconstruct(case)
     if ranks > 1:
         utility(case, "decomposePar", "-force", "-copyUniform", "-time", f"{start.time:.12g}")
     elif present:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
-
 import fluidfoam
 import numpy as np
 import pytest
 from probe import probe
 
-from conftest import set_entry
+from conftest import divide, set_entry
 from gbm_plugin.case.openfoam import utility
 
 BOX = 2 * np.pi
@@ -84,7 +82,7 @@ def test_samples_do_not_depend_on_the_decomposition(case, positions, division):
     """The fields are the same at step 0, so that samples agree to rounding, points on rank faces included."""
     ranks, n = division
     serial, parallel = case("serial", steps=1), case("parallel", steps=1)
-    _decompose(parallel, ranks, n)
+    divide(parallel, ranks, n)
     _, expected = probe(serial, positions)
     _, found = probe(parallel, positions, ranks=ranks)
     np.testing.assert_allclose(found[0][1], expected[0][1], atol=1e-14)
@@ -93,7 +91,7 @@ def test_samples_do_not_depend_on_the_decomposition(case, positions, division):
 
 def test_a_rank_may_own_no_bead(case):
     path = case(steps=1)
-    _decompose(path, 4, (1, 1, 4))
+    divide(path, 4, (1, 1, 4))
     _, samples = probe(path, np.full((3, 3), 0.3), ranks=4)
     assert np.ptp(samples[0][1], axis=0).max() == 0
 
@@ -102,7 +100,7 @@ def test_a_rank_may_own_no_bead(case):
 def test_openfoams_own_schemes(case, positions, scheme):
     """Each is second order or, for `cell`, first order: near the trilinear values, and the same on two ranks."""
     path, parallel = case("serial", steps=1, interpolation=scheme), case("parallel", steps=1, interpolation=scheme)
-    _decompose(parallel, 2, (1, 1, 2))
+    divide(parallel, 2, (1, 1, 2))
     inside = positions[:40]
     _, samples = probe(path, inside)
     _, on_two = probe(parallel, inside, ranks=2)
@@ -126,18 +124,3 @@ def test_a_mesh_of_unequal_cells_is_searched(case):
     (path / "constant/fvOptions").unlink()
     _, samples = probe(path, points)
     np.testing.assert_allclose(samples[0][1], np.tile([1.0, 2.0, 3.0], (50, 1)), atol=1e-12)
-
-
-def _decompose(case, ranks: int, n: tuple | None) -> None:
-    d = case / "system/decomposeParDict"
-    set_entry(d, "numberOfSubdomains", str(ranks))
-    if n is None:  # ragged bodies of cells, no planes
-        i, j, k = np.indices((CELLS,) * 3).transpose(0, 3, 2, 1).reshape(3, -1)  # x fastest
-        rank = (i // 5 + j // 3 + (k + i) // 4) % ranks
-        header = "FoamFile { version 2.0; format ascii; class labelList; object ranks; }\n"
-        (case / "constant/ranks").write_text(header + f"{len(rank)}({' '.join(map(str, rank))})\n")
-        set_entry(d, "method", "manual")
-        d.write_text(d.read_text() + 'manualCoeffs { dataFile "ranks"; }\n')
-    else:
-        d.write_text(re.sub(r"n\s+\(1 1 2\);", f"n ({n[0]} {n[1]} {n[2]});", d.read_text()))
-    utility(case, "decomposePar", "-force")

@@ -1,5 +1,6 @@
 #include "fiberCoupling.H"
 #include "allowedEntries.H"
+#include "consistentStart.H"
 #include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvc.H"
@@ -123,8 +124,7 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
 
     shakeHands(fiberProperties);
 
-    // what was read has old values on the patches between ranks
-    mesh_.lookupObjectRef<volVectorField>(UName_).correctBoundaryConditions();
+    consistentStart(mesh_, UName_, "phi");
 
     // The fibers start, or continue, from the flow at this time. Function
     // objects are not executed before the first step.

@@ -1,5 +1,6 @@
 #include "linearForcing.H"
 #include "allowedEntries.H"
+#include "consistentStart.H"
 #include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvMatrices.H"
@@ -44,6 +45,7 @@ Foam::fv::linearForcing::linearForcing
     read(dict);
     fieldNames_.setSize(1, UName_);
     applied_.setSize(1, false);
+    consistentStart(mesh, UName_, phiName_);
     readState();
 
     if (Pstream::master())
@@ -220,15 +222,7 @@ void Foam::fv::linearForcing::writeRow
 void Foam::fv::linearForcing::beginStep(const volVectorField& U)
 {
     const scalar deltaT = mesh_.time().deltaTValue();
-    if (nu_ == 0)
-    {
-        nu_ = kinematicViscosity(mesh_);
-
-        // what was read has old values on the patches between ranks
-        mesh_.lookupObjectRef<volVectorField>(UName_)
-            .correctBoundaryConditions();
-    }
-
+    nu_ = kinematicViscosity(mesh_);
     const flowStatistics now(U, nu_);
 
     if (!std::isfinite(now.k))
