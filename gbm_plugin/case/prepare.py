@@ -32,6 +32,8 @@ def initial_fields(scene: Scene) -> None:
     case = scene.case
     zero = case / "0"
     if not zero.is_dir():
+        if any(abs(t - scene.start_time) < 1e-9 * scene.time_step for t in time_folders(case)):
+            return
         if not (case / "0.orig").is_dir():
             raise CaseError(f"{case} has neither a folder 0 nor 0.orig: initial fields are missing")
         shutil.copytree(case / "0.orig", zero)

@@ -16,6 +16,7 @@ from .field import box_mesh, latest_time, read_velocity, vorticity_magnitude
 from .figures import end_to_end_figure, energy_figure, spectrum_figure
 from .picture import fibers_picture
 from .recording import Recording, open_recording
+from .series import write_series
 from .style import save, styled
 
 _FLOW = {  # column of linearForcing.dat: key figure
@@ -32,7 +33,8 @@ _FLOW = {  # column of linearForcing.dat: key figure
 
 
 def report(case_dir: Path | str) -> dict:
-    """Write figures (PNG, PDF), tables (CSV) and report.json into <case>/report/; returns the key figures.
+    """Write figures (PNG, PDF), tables (CSV), ParaView series (.pvd) and report.json into <case>/report/;
+    returns the key figures.
 
     Averages over time are over its second half. What cannot be drawn, because a file or a column is missing,
     is listed with the reason under "not_drawn". Key figures that are not defined are None (null in
@@ -52,6 +54,7 @@ def report(case_dir: Path | str) -> dict:
             if recording is not None and len(recording.times):
                 _fibers(recording, folder, key)
                 _picture(recording, folder, key, field)
+                key["files"] += [write_series(recording, folder, wrapped) for wrapped in (True, False)]
             elif recording is not None:
                 key["not_drawn"].append("fibers: the recording is empty")
         finally:

@@ -1,0 +1,88 @@
+"""OpenFOAM's own utilities, and meshio, on the result of a run."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+
+from conftest import gbm, make_case, run_case
+from gbm_plugin.case.openfoam import utility
+from gbm_plugin.output.recording import open_recording
+
+FAMILIES = """
+    soft { count 5; beads 6; length 1.2; bendingStiffness 1e-5; seed 3; }
+    stiff { count 3; beads 4; radius 0.1; youngModulus 40; seed 4; }
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    path = make_case(tmp_path_factory.mktemp("run") / "case", steps=10, write_every=5, families=FAMILIES)
+    run_case(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def recording(finished):
+    with open_recording(finished / "postProcessing/fibers") as recording:
+        yield recording
+
+
+def last_positions(recording) -> np.ndarray:
+    return np.concatenate([f.positions[-1].reshape(-1, 3) for f in recording.families.values()])
+
+
+def test_foam_to_vtk_shows_the_cloud_beside_the_flow(finished, recording):
+    utility(finished, "foamToVTK", "-latestTime", "-ascii")
+    assert list(finished.glob("VTK/*.vtm")) or list(finished.glob("VTK/**/internal.vtu"))
+    cloud = ElementTree.parse(next(finished.glob("VTK/lagrangian/fibers/*.vtp")))
+    arrays = {
+        a.get("Name"): np.array(a.text.split(), dtype=float) for a in cloud.iter("DataArray") if a.text is not None
+    }
+    expected = np.mod(last_positions(recording), 2 * np.pi)
+    np.testing.assert_allclose(arrays["Points"].reshape(-1, 3), expected, atol=1e-5)
+    np.testing.assert_array_equal(arrays["family"], [0] * 30 + [1] * 12)
+    np.testing.assert_array_equal(arrays["fiber"], [i // 6 for i in range(30)] + [i // 4 for i in range(12)])
+    np.testing.assert_array_equal(arrays["bead"], [i % 6 for i in range(30)] + [i % 4 for i in range(12)])
+
+
+def test_the_field_functions_of_post_process_run(finished):
+    utility(finished, "postProcess", "-func", "components(U)", "-latestTime")
+    assert (finished / "0.2/Ux").is_file()
+
+
+def test_the_whole_list_of_function_objects_runs_in_post_processing(finished):
+    """fiberCoupling is among them, and does not look for a daemon."""
+    utility(finished, "postProcess", "-latestTime")
+
+
+def test_report_and_fiber_series(finished, recording):
+    done = gbm("report", finished, "--json", finished / "figures.json")
+    assert done.returncode == 0, done.stderr
+    for name in ("energy.png", "spectrum.png", "end_to_end.png", "fibers.png", "flow.csv", "report.json"):
+        assert (finished / "report" / name).stat().st_size > 100
+    assert (finished / "report/fibers_wrapped.pvd").is_file()
+    unwrapped = sorted((finished / "report/unwrapped").glob("*.vtu"))
+    first, last = meshio.read(unwrapped[0]), meshio.read(unwrapped[-1])
+    np.testing.assert_allclose(last.points, last_positions(recording), atol=1e-12)
+    assert np.abs(last.points - first.points).max() > 0.01
+    assert last.cells_dict["line"].shape == (5 * 5 + 3 * 3, 2)
+
+
+def test_the_recording_says_where_it_comes_from(finished, recording):
+    assert recording.metadata["schema_version"] == 1
+    assert recording.metadata["program_version"]
+    assert "families" in recording.metadata["dictionaries"]["constant/fiberProperties"]
+    soft, stiff = recording.families["soft"], recording.families["stiff"]
+    assert (soft.seed, stiff.seed) == (3, 4)
+    assert stiff.radius == pytest.approx(0.1)
+    assert stiff.bending_stiffness == pytest.approx(40 * np.pi * 0.2**4 / 64)  # eq. (10)
+
+
+def test_lengths_are_exact(recording):
+    for family in recording.families.values():
+        links = np.linalg.norm(np.diff(family.positions[:], axis=2), axis=-1)
+        assert np.abs(links / (2 * family.radius) - 1).max() < 1e-12
