@@ -2,8 +2,8 @@
 
 The rotational form of a pseudo-spectral code needs nine transforms: their time alone is a scale for any of
 them. fluidsim runs in a process of its own (it may live in another environment); the contestants take turns, so
-that what else the machine does meets all of them, and the best of their turns is compared. fluidsim computes in
-double precision: it is the measure for both of ours.
+that what else the machine does meets all of them, and the best of their turns is compared. fluidsim works
+in double precision: it is the measure for both of ours.
 """
 
 import os

@@ -84,8 +84,8 @@ def project(products, u, out, j, rows, kx, ky, kz, scale, linear, row):
     """out = P [scale k.products + linear u] at the ky with index j, on real views.
 
     products (5, n, >= 2K+2), holding -i times the products at all kx; u, out (3, 2K+1, 2K+1, 2K+2);
-    kz (2K+2,); row (3, 2K+2) is scratch. Whole arrays are indexed, not parts of them: only so does the compiler
-    see few enough of them to vectorise the loop (3.5 times faster).
+    kz (2K+2,); row (3, 2K+2) is scratch. Whole arrays are indexed, not parts of them: only so does the
+    compiler see few enough of them to vectorise the loop (3.5 times faster).
     """
     b = ky[j]
     for i in range(u.shape[1]):
