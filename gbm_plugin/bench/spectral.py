@@ -1,8 +1,8 @@
 """Time per right-hand side of the spectral solver, beside fluidsim's ns3d and nine full real transforms.
 
 The rotational form of a pseudo-spectral code needs nine transforms: their time alone is a scale for any of
-them. fluidsim runs in a process of its own (it may live in another environment); the contestants take turns, so
-that what else the machine does meets all of them, and the best of their turns is compared. fluidsim works
+them. fluidsim runs in a process of its own (it may live in another environment); the contestants take turns,
+so that what else the machine does meets all of them, and the best of their turns is compared. fluidsim works
 in double precision: it is the measure for both of ours.
 """
 
