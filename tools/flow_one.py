@@ -24,9 +24,8 @@ SAVE_EVERY = 30.0  # seconds between checkpoints
 
 def build(args: argparse.Namespace) -> SpectralSolver:
     if args.flow == "linear":
-        solver = SpectralSolver(
-            args.cells, args.viscosity, forcing=LinearForcing(power=args.power), time_step=args.time_step
-        )
+        force = LinearForcing(power=args.power)
+        solver = SpectralSolver(args.cells, args.viscosity, forcing=force, time_step=args.time_step)
         solver.set_velocity(random_velocity(args.cells, rms=0.5))
         return solver
     preset = PRESETS[args.flow]
@@ -48,10 +47,23 @@ def random_velocity(cells: int, rms: float) -> np.ndarray:
     return rms * u / u.std()
 
 
+def refine(solver: SpectralSolver, checkpoint: Path) -> None:
+    """Start from the checkpoint of a coarser run: its modes, with the force in its present state."""
+    with np.load(checkpoint) as stored:
+        coarse = dict(stored)
+    count = coarse["coefficients"].shape[-1] - 1
+    signed = np.concatenate([np.arange(count + 1), np.arange(-count, 0)])
+    u = solver.operators.zeros()
+    u[np.ix_(range(3), signed, signed, range(count + 1))] = coarse["coefficients"]
+    solver.set_velocity(solver.operators.to_physical(u))
+    names = [name for name in coarse if name.startswith("forcing_")]
+    solver.forcing.restore({name.removeprefix("forcing_"): coarse[name] for name in names})
+
+
 class Run:
     """A solver with its recorded series and mean spectrum, in three files."""
 
-    def __init__(self, solver: SpectralSolver, out: Path, settle: float):
+    def __init__(self, solver: SpectralSolver, out: Path, settle: float, start: Path | None):
         self.solver, self.out, self.settle = solver, out, settle
         self.series, self.spectrum, self.samples = TimeSeries(), 0.0, 0
         if self.checkpoint.exists():
@@ -60,6 +72,8 @@ class Run:
             self.spectrum, self.samples = state.pop("mean_spectrum"), int(state.pop("samples"))
             solver.restore(state)
             self.series = TimeSeries.read(self.out.with_suffix(".csv")).until(solver.time + 1e-9)
+        elif start:
+            refine(solver, start)
 
     @property
     def checkpoint(self) -> Path:
@@ -97,12 +111,13 @@ def main() -> None:
     parser.add_argument("--time-step", type=float)
     parser.add_argument("--viscosity", type=float, default=0.02, help="linear only (default 0.02)")
     parser.add_argument("--power", type=float, default=0.1, help="linear only (default 0.1)")
+    parser.add_argument("--start", type=Path, help="checkpoint of a coarser run to start from")
     parser.add_argument("--out", type=Path, required=True, help="files without their suffix")
     args = parser.parse_args()
     stopped = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.append(True))
-    run = Run(build(args), args.out, args.settle)
+    run = Run(build(args), args.out, args.settle, args.start)
     start, first, saved = time.monotonic(), run.solver.time, time.monotonic()
     while run.solver.time < args.end - 1e-9 and not stopped:
         run.solver.advance(args.every)

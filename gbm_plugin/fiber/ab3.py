@@ -8,6 +8,7 @@ commute. The first two steps, without history, are midpoint steps: their error i
 import numpy as np
 from numba import njit, prange
 
+from .ambient import SAMPLES
 from .free_drain import link_rates
 from .layout import rotated
 from .simd import (
@@ -72,13 +73,13 @@ def plan(ages: list[float], step: float, count: int) -> np.ndarray:
 
 @njit(forceinline=True)
 def _blend(samples, b, weights, out):
-    """Ambient field of block b: the weighted sum of samples (3, B, 3N, LANES), or the one sample it equals."""
-    if weights[0] == 1.0 and weights[1] == 0.0 and weights[2] == 0.0:
-        return samples[0][b]
-    for i in range(out.shape[0] // 3):
-        value = scale(weights[0], load3(samples[0][b], i))
-        value = add_scaled(value, weights[1], load3(samples[1][b], i))
-        store3(out, i, add_scaled(value, weights[2], load3(samples[2][b], i)))
+    """Ambient field of block b: the weighted sum of samples, or the one it equals."""
+    for s in range(SAMPLES):
+        if weights[s] == 1.0:
+            return samples[s][b]
+    for row in range(out.shape[0]):
+        newer = weights[0] * load(samples[0][b], row) + weights[1] * load(samples[1][b], row)
+        store(out, row, newer + weights[2] * load(samples[2][b], row))
     return out
 
 
@@ -96,7 +97,7 @@ def advance(state, newest, older, velocity, rotation, weights, steps, beta, radi
     """One flow step in len(steps) sub-steps, for every block.
 
     state → out (B, 3N, LANES); newest, older: the (2, B, 3N, LANES) rate histories before and after it, filled as
-    [0] given, [1] written; velocity, rotation: three samples each; weights (sub-steps, STAGES, 3); steps: plan().
+    [0] given, [1] written; velocity, rotation: SAMPLES samples each; weights (sub-steps, STAGES, SAMPLES); steps: plan().
     error (B, LANES): rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
     """
     count, rows = steps.shape[0], state.shape[1]

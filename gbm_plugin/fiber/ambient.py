@@ -1,4 +1,4 @@
-"""The flow along each bead's own path: the samples received so far, and the polynomial in time through them."""
+"""The flow along each bead's own path: the samples received, and the polynomial in time through them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from .layout import pack, unpack
 
-KEPT = 4  # three to extrapolate from, and the newest to compare with
+SAMPLES = 3  # in the polynomial in time
+KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction
 
 
 def lagrange_weights(times, time: float) -> np.ndarray:
@@ -20,7 +21,7 @@ def lagrange_weights(times, time: float) -> np.ndarray:
 
 
 class Ambient:
-    """Samples of velocity (and rotation, strain) at the beads, newest last; at most three enter a polynomial."""
+    """The newest samples of velocity, rotation (and strain) at the beads, newest last."""
 
     def __init__(self, fibers: int, beads: int, need: str):
         self.shape = (fibers, beads)
@@ -66,16 +67,21 @@ class Ambient:
         strain = 0.5 * (gradient + transpose)[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
         return velocity, 0.5 * curl, strain
 
-    def recent(self) -> tuple[list[float], list[tuple[np.ndarray, ...]]]:
-        """Times and samples of the polynomial, newest first."""
-        return self.times[:-4:-1], self.samples[:-4:-1]
+    def polynomial(self, start: float) -> tuple[np.ndarray, list[tuple[np.ndarray, ...]]]:
+        """Times counted from start, and fields, of the newest samples, newest first.
+
+        Each field is a tuple of SAMPLES arrays, of which the first len(times) count.
+        """
+        times, recent = self.times[: -1 - SAMPLES : -1], self.samples[: -1 - SAMPLES : -1]
+        recent = recent + [recent[-1]] * (SAMPLES - len(recent))
+        return np.array(times) - start, list(zip(*recent, strict=True))
 
     @property
     def prediction_gap(self) -> np.ndarray:
-        """(F,) rms over the beads of |extrapolated − received velocity| of the newest sample; 0 with one sample."""
+        """(F,) rms over the beads of |extrapolated − received velocity| at the newest sample; 0 with one."""
         if len(self) < 2:
             return np.zeros(self.shape[0])
-        before, earlier = self.times[-4:-1], self.samples[-4:-1]
+        before, earlier = self.times[-1 - SAMPLES : -1], self.samples[-1 - SAMPLES : -1]
         gap = self.samples[-1][0].copy()
         for weight, sample in zip(lagrange_weights(before, self.times[-1]), earlier, strict=True):
             gap -= weight * sample[0]

@@ -18,12 +18,10 @@ FOLD = 1e-12  # smallest 1 + cos θ: keeps the moment of a folded discrete rod f
 
 def bending_energy(links: np.ndarray, stiffness: np.ndarray, radius: float, law: str) -> np.ndarray:
     """(F,) elastic energy of links (F, N−1, 3): Σ (K/2a)(1 − cos θ), or −Σ (K/a) ln((1 + cos θ)/2)."""
-    cosine = (links[:, :-1] * links[:, 1:]).sum(axis=2)
-    if law == "sine":
-        # 1 − cos θ = |t − t'|²/2 keeps its digits for small angles
-        density = ((links[:, :-1] - links[:, 1:]) ** 2).sum(axis=2) / 4
-    else:
-        density = -np.log(np.maximum(1 + cosine, FOLD) / 2)
+    # sin²(θ/2) = |t − t'|²/4 keeps its digits for small angles
+    density = (np.diff(links, axis=1) ** 2).sum(axis=2) / 4
+    if law == "discreteRod":
+        density = -np.log1p(-np.minimum(density, 1 - FOLD / 2))
     return stiffness / radius * density.sum(axis=1)
 
 

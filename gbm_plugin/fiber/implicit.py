@@ -14,18 +14,20 @@ import numpy as np
 from numba import njit, prange
 
 from .ab3 import turn_links
+from .ambient import SAMPLES
 from .implicit_drain import stage, work_rows
-from .simd import LANES, add, add_scaled, dot, load, load3, scale, splat, sqrt, store, store3, subtract
+from .simd import LANES, add, add_scaled, dot, load, load3, scale, smaller, splat, sqrt, store, store3, subtract
 
 D = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the classical step-size rule
+RIGID = 2e7  # largest σβ: bending rates above 1e9/h follow the flow no closer, but drown it in rounding
 FLOW_TIMES = np.array([D, 0.5, 1 - D])  # of the stages, in steps
 
 
 def scratch_rows(beads: int) -> int:
     """Scratch rows per thread for fibers of so many beads."""
-    return 51 * beads + 16 + work_rows(beads)
+    return 51 * beads + 8 + work_rows(beads)
 
 
 @njit(forceinline=True)
@@ -40,10 +42,21 @@ def _gather(blocks, members, whole, out):
     return out
 
 
+@njit(forceinline=True)
+def _gather_samples(samples, members, whole, out):
+    """The lanes of eight fibers in each of SAMPLES samples."""
+    rows = samples[0].shape[1]
+    return (
+        _gather(samples[0], members, whole, out[:rows]),
+        _gather(samples[1], members, whole, out[rows : 2 * rows]),
+        _gather(samples[2], members, whole, out[2 * rows : 3 * rows]),
+    )
+
+
 @njit
 def _lagrange(times, count, time, out, lane):
     """Weights of the values at times[:count] in their polynomial at one time, into out[:, lane]."""
-    for j in range(3):
+    for j in range(SAMPLES):
         weight = 1.0 if j < count else 0.0
         for m in range(count):
             if m != j and j < count:
@@ -52,9 +65,10 @@ def _lagrange(times, count, time, out, lane):
 
 
 @njit(forceinline=True)
-def _blend(s0, s1, s2, weights, out):
-    """Ambient field at each lane's own time."""
+def _blend(samples, weights, out):
+    """Ambient field at each lane's own time, from its samples, one after the other in rows."""
     w0, w1, w2 = load(weights, 0), load(weights, 1), load(weights, 2)
+    s0, s1, s2 = samples
     for row in range(out.shape[0]):
         store(out, row, w0 * load(s0, row) + w1 * load(s1, row) + w2 * load(s2, row))
 
@@ -67,7 +81,7 @@ def attempt(
     """One step of its own size for every fiber in members, accepted where the error estimate allows.
 
     source → out (B, 3N, LANES), lagged → out_lagged (B, 3(N−1), LANES): links and multipliers; velocity, rotation:
-    three samples each, the first len(times) of them valid at times, counted from the start of the flow step. Per fiber: trial, the step to try; elapsed, step, error: time reached, suggested next step, and
+    SAMPLES samples each, the first len(times) of them valid at times, counted from the start of the flow step. Per fiber: trial, the step to try; elapsed, step, error: time reached, suggested next step, and
     error estimate, updated.
     """
     rows = source.shape[1]
@@ -77,10 +91,10 @@ def attempt(
     for thread in prange(threads):
         work = scratch[thread]
         own, mine = work[:rows], work[rows : 2 * rows]
-        u, spin = work[8 * rows : 9 * rows], work[9 * rows : 10 * rows]
-        middle, new = work[10 * rows : 11 * rows], work[11 * rows : 12 * rows]
-        k1, k2, k3 = work[12 * rows : 13 * rows], work[13 * rows : 14 * rows], work[14 * rows : 15 * rows]
-        history, multipliers = work[15 * rows : 16 * rows], work[16 * rows : 17 * rows]
+        u, spin = work[2 * rows : 3 * rows], work[3 * rows : 4 * rows]
+        middle, new = work[4 * rows : 5 * rows], work[5 * rows : 6 * rows]
+        k1, k2, k3 = work[6 * rows : 7 * rows], work[7 * rows : 8 * rows], work[8 * rows : 9 * rows]
+        history, multipliers = work[9 * rows : 10 * rows], work[10 * rows : 11 * rows]
         weights, sizes = work[17 * rows : 17 * rows + 3], work[17 * rows + 3 : 17 * rows + 8]
         rest = work[17 * rows + 8 :]
         eight = np.empty(LANES, np.int64)
@@ -93,20 +107,17 @@ def attempt(
                 sizes[1, lane] = beta[eight[lane] // LANES, eight[lane] % LANES]
             now = _gather(source, eight, whole, own)
             lag = _gather(lagged, eight, whole, mine)
-            v0 = _gather(velocity[0], eight, whole, work[2 * rows : 3 * rows])
-            v1 = _gather(velocity[1], eight, whole, work[3 * rows : 4 * rows])
-            v2 = _gather(velocity[2], eight, whole, work[4 * rows : 5 * rows])
-            r0 = _gather(rotation[0], eight, whole, work[5 * rows : 6 * rows])
-            r1 = _gather(rotation[1], eight, whole, work[6 * rows : 7 * rows])
-            r2 = _gather(rotation[2], eight, whole, work[7 * rows : 8 * rows])
-            h, stiff = load(sizes, 0), load(sizes, 1)
+            flow = _gather_samples(velocity, eight, whole, work[11 * rows : 14 * rows])
+            spins = _gather_samples(rotation, eight, whole, work[14 * rows : 17 * rows])
+            h = load(sizes, 0)
             sigma = (0.5 * D / radius) * h
+            stiff = smaller(load(sizes, 1), RIGID / sigma)
             for s in range(3):
                 for lane in range(LANES):
                     at = elapsed[eight[lane]] + FLOW_TIMES[s] * sizes[0, lane]
                     _lagrange(times, len(times), at, weights, lane)
-                _blend(v0, v1, v2, weights, u)
-                _blend(r0, r1, r2, weights, spin)
+                _blend(flow, weights, u)
+                _blend(spins, weights, spin)
                 if s == 0:
                     for row in range(rows):
                         store(history, row, splat(0.0))

@@ -122,14 +122,23 @@ def sqrt(typingctx, value):
     return lanes(lanes), codegen
 
 
-@intrinsic
-def larger(typingctx, left, right):
-    """The larger number in every lane; the right one where the left is NaN."""
-
+def _chosen(comparison):
     def codegen(context, builder, signature, args):
-        return builder.select(builder.fcmp_ordered(">", *args), *args)
+        return builder.select(builder.fcmp_ordered(comparison, *args), *args)
 
     return lanes(lanes, lanes), codegen
+
+
+@intrinsic
+def larger(typingctx, left, right):
+    """The larger number in every lane; the right one where either is NaN."""
+    return _chosen(">")
+
+
+@intrinsic
+def smaller(typingctx, left, right):
+    """The smaller number in every lane; the right one where either is NaN."""
+    return _chosen("<")
 
 
 # three-vectors are tuples of three lane numbers

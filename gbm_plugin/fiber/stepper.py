@@ -6,7 +6,7 @@ import numpy as np
 from numba import get_num_threads
 
 from . import ab3, implicit
-from .ambient import Ambient, lagrange_weights
+from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .fibers import Fibers, one_of, positive
 from .layout import bead_positions, pack
@@ -109,7 +109,7 @@ class Stepper:
         length = positive("time_step", time_step)
         if not self._ambient.times or self._ambient.times[-1] != self.time:
             raise ValueError(f"no sample of the flow at time {self.time:g}; observe() comes before advance()")
-        self.provisional = len(self._ambient) < 3
+        self.provisional = len(self._ambient) < SAMPLES
         self._start, self._length = self.time, length
         self._state, self._last = self._last, self._state
         self._multipliers, self._last_multipliers = self._last_multipliers, self._multipliers
@@ -165,8 +165,8 @@ class Stepper:
     def _explicit(self, count: int) -> np.ndarray:
         """All fibers by ab3 in count sub-steps; returns the error estimates (F,)."""
         fibers, h = self.fibers, self._length / count
-        times, velocity, rotation = self._samples()
-        weights = np.zeros((count, ab3.STAGES, 3))
+        times, (velocity, rotation, *_) = self._ambient.polynomial(self._start)
+        weights = np.zeros((count, ab3.STAGES, SAMPLES))
         for s in range(count):
             for stage in range(ab3.STAGES):
                 at = (s + stage / ab3.STAGES) * h
@@ -189,7 +189,7 @@ class Stepper:
     def _implicit(self, members: np.ndarray) -> None:
         """The given fibers by linearly implicit steps, each with as many as its error estimate asks for."""
         fibers, end = self.fibers, self._length
-        times, velocity, rotation = self._samples()
+        times, (velocity, rotation, *_) = self._ambient.polynomial(self._start)
         elapsed, error, trial = np.zeros(fibers.count), np.zeros(fibers.count), np.zeros(fibers.count)
         source, lagged = self._last, self._last_multipliers
         attempts, refined = 0, np.zeros(0, dtype=int)
@@ -211,12 +211,6 @@ class Stepper:
             self._counts["refinements"] += len(members)
         self._counts["refined_fibers"] += len(refined)
         self._counts["substeps"] += attempts
-
-    def _samples(self):
-        """Times from the start of the step, and three samples each of velocity and rotation (the last repeated)."""
-        times, samples = self._ambient.recent()
-        fields = [tuple([*field, field[-1], field[-1]][:3]) for field in zip(*samples, strict=True)]
-        return np.array(times) - self._start, fields[0], fields[1]
 
     def _count(self, substeps: int, error: np.ndarray) -> None:
         self._counts["substeps"] += substeps

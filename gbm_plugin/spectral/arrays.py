@@ -50,10 +50,10 @@ class Arrays:
                 target[stored] = full[place][..., : cut + 1]
         return out
 
-    def to_physical(self, modes: Array) -> Array:
-        """Real fields (m, n, n, n) at the nodes, from modes (m, 2K+1, 2K+1, K+1)."""
+    def to_physical(self, modes: Array, out: Array | None = None) -> Array:
+        """Real fields (m, n, n, n) at the nodes from modes (m, 2K+1, 2K+1, K+1), written to `out` if given."""
         n, cut = self.modes.cells, self.modes.cut
-        out = self.xp.empty((len(modes), n, n, n), self.real)
+        out = self.xp.empty((len(modes), n, n, n), self.real) if out is None else out
         for source, target in zip(modes, out, strict=True):
             full = self.xp.zeros((n, n, n // 2 + 1), self.complex)
             for stored, place in self.modes.blocks():

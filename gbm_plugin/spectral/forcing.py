@@ -106,10 +106,11 @@ class EswaranPope(Forcing):
         self._operators = operators
         both = np.concatenate([self._k, -self._k])
         stored = both[:, 2] >= 0
-        self._index = tuple(both[stored].T)  # negative kx, ky count from the end, as they are stored
+        # negative kx, ky count from the end, as they are stored
+        self._index = tuple(operators.xp.asarray(i) for i in both[stored].T)
         self._source = np.tile(np.arange(len(self._k)), 2)[stored]
         self._mirrored = (np.arange(len(both)) >= len(self._k))[stored]
-        self._weights = modes.weights[self._index[2]]
+        self._weights = modes.weights[both[stored, 2]]
 
     def force(self) -> NDArray:
         """Complex amplitudes (M, 3) of the force in the half shell."""

@@ -52,6 +52,18 @@ def unpack(planes, mixed, first, rows):
 
 
 @jit
+def split(planes, first, out):
+    """Write the plane pairs to fields out (m <= 3, n, n, n), from x = first on."""
+    for pair in range(planes.shape[0]):
+        x = first + 2 * pair
+        for c in range(out.shape[0]):
+            for j in range(out.shape[2]):
+                for m in range(out.shape[3]):
+                    out[c, x, j, m] = planes[pair, c, j, m].real
+                    out[c, x + 1, j, m] = planes[pair, c, j, m].imag
+
+
+@jit
 def products(planes, width):
     """Replace u, v, w in planes (pairs, 5, n, *), a real view, by u^2 - w^2, v^2 - w^2, uv, uw, vw."""
     for pair in range(planes.shape[0]):
@@ -83,9 +95,9 @@ def max_speed(planes, width):
 def project(products, u, out, j, rows, kx, ky, kz, scale, linear, row):
     """out = P [scale k.products + linear u] at the ky with index j, on real views.
 
-    products (5, n, >= 2K+2), holding -i times the products at all kx; u, out (3, 2K+1, 2K+1, 2K+2); kz (2K+2,);
-    row (3, 2K+2) is scratch. Whole arrays are indexed, not parts of them: only so does the compiler see few
-    enough of them to vectorise the loop (3.5 times faster).
+    products (5, n, >= 2K+2), holding -i times the products at all kx; u, out (3, 2K+1, 2K+1, 2K+2);
+    kz (2K+2,); row (3, 2K+2) is scratch. Whole arrays are indexed, not parts of them: only so does the
+    compiler see few enough of them to vectorise the loop (3.5 times faster).
     """
     b = ky[j]
     for i in range(u.shape[1]):

@@ -67,23 +67,19 @@ class Slabs(Arrays):
         self._share(lambda worker, start, stop: [finish(worker, j) for j in range(start, stop)], len(ky))
         self.max_speed = max(speeds) if want_speed else None
 
-    def to_physical(self, modes):
+    def to_physical(self, modes, out=None):
         n = self.modes.cells
-        out = np.empty((len(modes), n, n, n), self.real)
+        out = np.empty((len(modes), n, n, n), self.real) if out is None else out
         for first in range(0, len(modes), 3):
             part = out[first : first + 3]
-            fields = np.zeros((3, *self.modes.shape), self.complex)
-            fields[: len(part)] = modes[first : first + 3]
 
-            def unload(worker, first, planes, part=part):
-                kernels.pack(self._mixed, first, planes, self._rows)
+            def split(worker, x, planes, part=part):
+                kernels.pack(self._mixed, x, planes, self._rows)
                 worker.inverse(len(planes))
-                for pair, plane in enumerate(planes):
-                    part[:, first + 2 * pair] = plane[: len(part), :, :n].real
-                    part[:, first + 2 * pair + 1] = plane[: len(part), :, :n].imag
+                kernels.split(planes, x, part)
 
-            self._to_mixed(fields)
-            self._each_block(unload)
+            self._to_mixed(modes[first : first + 3])
+            self._each_block(split)
         return out
 
     def combine(self, out: np.ndarray, terms: list[Term]) -> float:
@@ -116,16 +112,16 @@ class Slabs(Arrays):
         )
 
     def _to_mixed(self, u: np.ndarray) -> None:
-        """Points in x, modes in y and z, of three fields."""
-        cut, mixed = self.modes.cut, self._mixed
+        """Points in x, modes in y and z, of up to three fields."""
+        cut, mixed, count = self.modes.cut, self._mixed, len(u)
 
         def column(worker, j):
-            buffer = worker.columns[:3, :, : cut + 1]
+            buffer = worker.columns[:count, :, : cut + 1]
             buffer[:, : cut + 1] = u[:, : cut + 1, j]
             buffer[:, cut + 1 : -cut] = 0
             buffer[:, -cut:] = u[:, cut + 1 :, j]
             worker.inverse_x.execute()
-            mixed[:3, :, j] = buffer
+            mixed[:count, :, j] = buffer
 
         self._share(lambda worker, start, stop: [column(worker, j) for j in range(start, stop)], 2 * cut + 1)
 

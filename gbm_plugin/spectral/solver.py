@@ -64,6 +64,7 @@ class SpectralSolver:
         self._u = self.operators.zeros()
         self._energy = 0.0
         self._fields: dict[str, Array] = {}  # physical fields of the present time
+        self._spare: dict[str, Array] = {}  # those of the past, to be written over
 
     cells = property(lambda self: self.modes.cells, doc="Nodes per edge.")
     box = property(lambda self: self.modes.box, doc="Edge length.")
@@ -83,7 +84,7 @@ class SpectralSolver:
         self.operators.close(self._u)
         self._energy = self.operators.energy(self._u)
         self._stepper.forget()
-        self._fields.clear()
+        self._discard_fields()
 
     @property
     def velocity(self) -> NDArray:
@@ -105,7 +106,7 @@ class SpectralSolver:
             self.forcing.advance(h)
             self.time += h
             self.step += 1
-            self._fields.clear()
+            self._discard_fields()
             if not np.isfinite(self._energy):
                 reason = (
                     f"velocity is not finite after step {self.step}, t = {self.time:.6g}, time step {h:.3g}"
@@ -198,7 +199,7 @@ class SpectralSolver:
         self._stepper.restore(state)
         prefix = "forcing_"
         self.forcing.restore({k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)})
-        self._fields.clear()
+        self._discard_fields()
 
     def _evaluate(self, u: Array, out: Array, energy: float) -> None:
         """du/dt without viscosity."""
@@ -227,10 +228,15 @@ class SpectralSolver:
         if abs(self.time - time) > max(slack, 1e-12 * abs(time)):
             raise ValueError(f"the flow is known at t = {self.time:.10g}, not at t = {time:.10g}")
 
+    def _discard_fields(self) -> None:
+        """The flow has changed."""
+        self._spare |= self._fields
+        self._fields = {}
+
     def _physical(self, name: str, modes) -> Array:
         """The fields at the nodes, computed once per time."""
         if name not in self._fields:
-            self._fields[name] = self.operators.to_physical(modes())
+            self._fields[name] = self.operators.to_physical(modes(), self._spare.pop(name, None))
         return self._fields[name]
 
     def _at(self, points: NDArray, name: str, modes) -> NDArray:

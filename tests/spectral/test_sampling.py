@@ -110,7 +110,9 @@ def test_only_what_is_needed_is_computed(monkeypatch):
     solver = smooth(16, "trilinear")
     transformed = []
     plain = solver.operators.to_physical
-    monkeypatch.setattr(solver.operators, "to_physical", lambda m: transformed.append(len(m)) or plain(m))
+    monkeypatch.setattr(
+        solver.operators, "to_physical", lambda m, out: transformed.append(len(m)) or plain(m, out)
+    )
     points = np.ones((4, 3))
     assert solver.sample(points, 0.0, "velocity")[1] is None
     assert sum(transformed) == 3

@@ -8,6 +8,8 @@ import pytest
 from fields import abc, nodes, noise, taylor_green
 
 from gbm_plugin.spectral import EswaranPope, LinearForcing, SpectralSolver
+from gbm_plugin.spectral.arrays import Arrays
+from gbm_plugin.spectral.presets import PRESETS
 from gbm_plugin.statistics import turbulence
 
 # spectralDNS test suite (RK4): 32^3, nu = 0.000625, t = 0.1
@@ -281,8 +283,38 @@ def test_bad_fields_and_states_are_refused():
         SpectralSolver(8, 0.1, cfl=0.2).advance()
 
 
+@pytest.mark.parametrize("scheme", ["ab3", "rk4"])
+@pytest.mark.parametrize("step", [{"time_step": 0.02}, {"cfl": 0.2}])
+@pytest.mark.parametrize("interpolation", ["cubic", "exact"])
+def test_whole_arrays_do_all_that_slabs_do(monkeypatch, scheme, step, interpolation):
+    """What runs on a GPU, run over NumPy: same flow, statistics, samples, and bitwise restart."""
+
+    def solver():
+        force = EswaranPope(variance=0.01, time_scale=0.5, cutoff=2, seed=4)
+        made = SpectralSolver(12, 0.02, forcing=force, scheme=scheme, interpolation=interpolation, **step)
+        made.set_velocity(taylor_green(12))
+        return made
+
+    slabs = solver()
+    monkeypatch.setattr(
+        "gbm_plugin.spectral.solver.Slabs", lambda m, nu, precision, _: Arrays(m, nu, precision)
+    )
+    arrays, restarted = solver(), solver()
+    for s in (slabs, arrays):
+        s.advance(6)
+    assert type(slabs.operators) is not type(arrays.operators) is Arrays
+    assert relative(arrays.velocity, slabs.velocity) < 1e-13
+    assert arrays.statistics() == pytest.approx(slabs.statistics(), rel=1e-11)
+    points = np.random.default_rng(0).uniform(0, 6, (5, 3))
+    for one, other in zip(arrays.sample(points, arrays.time), slabs.sample(points, slabs.time), strict=True):
+        assert one == pytest.approx(other, abs=1e-12)
+    restarted.restore(arrays.state())
+    for s in (arrays, restarted):
+        s.advance(3)
+    assert np.array_equal(arrays.coefficients, restarted.coefficients)
+
+
 def test_gpu_without_one_is_refused_in_one_line():
-    pytest.importorskip("numpy")
     try:
         import cupy  # noqa: F401
     except ImportError:
@@ -300,3 +332,19 @@ def test_reference_values_are_the_projects():
         pytest.skip("no shared reference file")
     stored = json.loads(path.read_text())["taylor_green_vortex_32"]
     assert {name: stored[name] for name in TAYLOR_GREEN} == TAYLOR_GREEN
+
+
+@pytest.mark.parametrize(
+    "name, epsilon, cells", [("flow_I", 0.0015, 128), ("flow_II", 0.34, 512), ("flow_II_prime", 0.05, 256)]
+)
+def test_presets_aim_at_their_dissipation(name, epsilon, cells):
+    """Eswaran & Pope's own estimate, eps = 4 eps* N_F / (1 + T* N_F^(1/3) / 0.8), holds to 15 % (k0 = 1)."""
+    preset = PRESETS[name]
+    drive = preset.variance * preset.time_scale
+    count = preset.forcing().mode_count
+    memory = preset.time_scale * drive ** (1 / 3)
+    assert 4 * drive * count / (1 + memory * count ** (1 / 3) / 0.8) == pytest.approx(epsilon, rel=0.15)
+    assert preset.cells == cells
+    solver = preset.solver(cells=16)
+    solver.advance(3)
+    assert solver.statistics()["power"] != 0

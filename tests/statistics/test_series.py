@@ -61,3 +61,23 @@ def test_refusals():
         series.mean(np.zeros((3, 3)))
     with pytest.raises(ValueError, match="batches"):
         series.batch_means([1.0, 2.0], batches=3)
+
+
+def test_time_series_round_trip(tmp_path):
+    record = series.TimeSeries()
+    values = 2 + ar1(0.9, 3000, seed=4)
+    for n, value in enumerate(values):
+        record.record(0.5 * n, {"k": value, "eps": 2 * value})
+    record.write(tmp_path / "series.csv")
+    again = series.TimeSeries.read(tmp_path / "series.csv")
+    assert list(again.columns) == ["time", "k", "eps"]
+    assert again["k"] == pytest.approx(values, rel=1e-9)
+    assert len(again.until(100.0)) == 201
+    since = again.mean("eps", since=500.0)
+    assert since.value == pytest.approx(2 * values[1000:].mean())
+    assert since.correlation_time == pytest.approx(0.5 * 9.5, rel=0.4)
+    assert since.duration == pytest.approx(1000.0)
+    with pytest.raises(ValueError, match="recorded are time, k, eps"):
+        record.record(1500.0, {"k": 1.0})
+    with pytest.raises(ValueError, match="fewer than two"):
+        record.mean("k", since=1e9)
