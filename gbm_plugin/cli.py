@@ -60,6 +60,25 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("info", _info, "Say what a case contains and whether the fiber model holds in it. SI units.")
     add_case(sub)
     _add_json(sub)
+    sub = add("bench", None, "Measure speed beside error; ratios within one run.")
+    kinds = sub.add_subparsers(dest="kind", required=True, metavar="KIND")
+
+    kind = kinds.add_parser("coupling", help="what the coupling costs a step of OpenFOAM")
+    kind.set_defaults(action=_bench_coupling)
+    add_case(kind)
+    kind.add_argument("--cells", type=int, default=64, help="cells in each direction (default: 64)")
+    kind.add_argument("--fibers", type=int, default=1000, help="(default: 1000)")
+    kind.add_argument("--beads", type=int, default=20, help="of each fiber (default: 20)")
+    kind.add_argument("--steps", type=int, default=30, help="(default: 30)")
+    kind.add_argument("--transport", choices=("socket", "tcp", "file"), default="socket", help="(default: socket)")
+    _add_json(kind)
+
+    kind = kinds.add_parser("spectral", help="a right-hand side of the spectral solver, beside fluidsim if there")
+    kind.set_defaults(action=_bench_spectral)
+    kind.add_argument("--cells", type=int, default=128, help="in each direction (default: 128)")
+    kind.add_argument("--threads", type=int, default=1, help="(default: 1)")
+    kind.add_argument("--fluidsim", metavar="PYTHON", default=sys.executable, help="interpreter that has fluidsim")
+    _add_json(kind)
     return parser
 
 
@@ -91,6 +110,23 @@ def _info(arguments) -> dict:
 
     result = figures(read_scene(arguments.case))
     print(describe(result))
+    return result
+
+
+def _bench_coupling(arguments) -> dict:
+    from .bench import coupling
+
+    sizes = {name: getattr(arguments, name) for name in ("cells", "fibers", "beads", "steps", "transport")}
+    result = coupling.run(arguments.case, **sizes)
+    print(coupling.table(result))
+    return result
+
+
+def _bench_spectral(arguments) -> dict:
+    from .bench import spectral
+
+    result = spectral.run(arguments.cells, arguments.threads, fluidsim_python=arguments.fluidsim)
+    print(spectral.table(result))
     return result
 
 
