@@ -50,6 +50,16 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--parallel", action="store_true", help="on the MPI ranks of system/decomposeParDict")
     sub.add_argument("--fresh", action="store_true", help="from the beginning; earlier results go to previous/<n>")
 
+    sub.add_argument(
+        "--flow",
+        choices=("openfoam", "spectral"),
+        default="openfoam",
+        help="what solves the flow: OpenFOAM, or the pseudo-spectral solver, whose results go to CASE/spectral",
+    )
+    sub.add_argument("--threads", type=int, default=1, help="of the spectral solver (default: 1)")
+    sub.add_argument("--precision", choices=("double", "single"), default="double", help="of the spectral solver")
+    sub.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="of the spectral solver; gpu needs CuPy")
+
     sub = add("daemon", _daemon, "Move the fibers of a case for a solver that is started by hand.")
     add_case(sub)
 
@@ -87,9 +97,15 @@ def _add_json(sub: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments) -> None:
-    from .run import run
+    from .run import run, run_spectral
 
-    run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
+    if arguments.flow == "openfoam":
+        run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
+        return
+    if arguments.parallel:
+        raise ValueError("--parallel is for OpenFOAM; the spectral solver takes --threads")
+    options = {name: getattr(arguments, name) for name in ("fresh", "threads", "precision", "device")}
+    run_spectral(arguments.case, **options)
 
 
 def _daemon(arguments) -> None:

@@ -22,6 +22,7 @@ from .output.progress import Progress
 
 log = logging.getLogger(__name__)
 
+STOPPED = "stopped on request; everything is written: the same command continues"
 GRACE = 10.0  # how long one side may outlive the other before it is ended [s]
 
 
@@ -50,6 +51,16 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
         _Pair(scene, ranks, start.time).run()
         if ranks > 1:
             reconstruct(case)
+
+
+def run_spectral(case: Path | str, **options) -> None:
+    """Run a case in the pseudo-spectral solver; options as those of `spectral_run.run_spectral`."""
+    from . import spectral_run
+
+    case = Path(case).resolve()
+    with _only_run(case):
+        if not spectral_run.run_spectral(read_scene(case), **options):
+            raise RunError(STOPPED)
 
 
 @contextmanager
@@ -134,7 +145,7 @@ class _Pair:
         solver, daemon = self.solver.returncode, self.daemon.returncode
         if solver == 0 and daemon == 0:
             if self.stopping:
-                raise RunError("stopped on request; everything is written: the same command continues")
+                raise RunError(STOPPED)
             return
         problem = fatal_message(self.solver_log)
         daemon_problem = _last_error(self.daemon_log)

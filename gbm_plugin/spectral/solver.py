@@ -91,6 +91,12 @@ class SpectralSolver:
         """Velocity at the nodes, (3, n, n, n), [c, i, j, k] at (i, j, k) box/n."""
         return self.operators.host(self._physical("velocity", lambda: self._u)).copy()
 
+    def shifted_velocity(self, fraction: float) -> NDArray:
+        """Velocity (3, n, n, n) at ((i, j, k) + fraction) box/n: 1/2 for the centres of the cells between nodes."""
+        i, j, k = (np.exp(1j * axis * fraction * self.box / self.cells) for axis in self.modes.k)
+        modes = self.operators.xp.asarray(self.coefficients * (i * j * k))
+        return self.operators.host(self.operators.to_physical(modes.astype(self._u.dtype)))
+
     @property
     def coefficients(self) -> NDArray:
         """Fourier coefficients of the velocity, (3, 2K+1, 2K+1, K+1), ordered as `Modes` says."""
@@ -134,6 +140,14 @@ class SpectralSolver:
             | turbulence.gradient_moments(operators.host(operators.to_physical(slopes)))
             | {"power": self.forcing.power(u, self._energy)}
         )
+
+    def energetics(self) -> dict[str, float]:
+        """kinetic_energy of the fluctuations, power and dissipation at the present time; costs no transform."""
+        return {
+            "kinetic_energy": self._energy,
+            "power": self.forcing.power(self._u, self._energy),
+            "dissipation": self._dissipation(),
+        }
 
     def energy_budget(self) -> dict[str, float]:
         """rate = d<|u|^2>/2dt = power + transfer - dissipation; transfer (nonlinear) vanishes to rounding."""
