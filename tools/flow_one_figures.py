@@ -94,8 +94,8 @@ def linear(folder: Path) -> None:
         span = mean["dissipation"].duration
         eddies = [span * eps / mean["kinetic_energy"].value, span / mean["turnover_time"].value]
         lines.append(
-            f"| {n}³ | {mean['taylor_reynolds']} | {ratio:.4f} ± {ratio * error:.4f} | {mean['dissipation']} | "
-            f"{s['power'].mean():.6g} | {eddies[0]:.0f} | {eddies[1]:.0f} |"
+            f"| {n}³ | {mean['taylor_reynolds']} | {ratio:.4f} ± {ratio * error:.4f} | "
+            f"{mean['dissipation']} | {s['power'].mean():.6g} | {eddies[0]:.0f} | {eddies[1]:.0f} |"
         )
         axis.plot(s["time"], s["dissipation_length"] / (2 * np.pi), lw=0.8, label=f"{n}³")
     axis.axhline(0.19, color="k", lw=0.8, ls=":")
