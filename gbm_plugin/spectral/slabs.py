@@ -43,15 +43,15 @@ class Slabs(Arrays):
         kz = np.repeat(kz, 2)  # real and imaginary part
         linear = self.real.type(linear)
         source, target = u.view(self.real), out.view(self.real)
-        speeds = [0.0] * self.threads
+        for worker in self._workers:
+            worker.speed = 0.0
 
         def multiply(worker, first, planes):
             kernels.pack(mixed, first, planes, self._rows)
             worker.inverse(len(planes))
             view = planes.view(self.real)
             if want_speed:
-                speed = kernels.max_speed(view, 2 * n)
-                speeds[self._workers.index(worker)] = max(speeds[self._workers.index(worker)], speed)
+                worker.speed = max(worker.speed, kernels.max_speed(view, 2 * n))
             kernels.products(view, 2 * n)
             worker.forward(len(planes))
             kernels.unpack(planes, mixed, first, self._rows)
@@ -65,7 +65,7 @@ class Slabs(Arrays):
         self._to_mixed(u)
         self._each_block(multiply)
         self._share(lambda worker, start, stop: [finish(worker, j) for j in range(start, stop)], len(ky))
-        self.max_speed = max(speeds) if want_speed else None
+        self.max_speed = max(w.speed for w in self._workers) if want_speed else None
 
     def to_physical(self, modes, out=None):
         n = self.modes.cells
@@ -155,6 +155,7 @@ class _Worker:
         pairs = min(n // 2, max(1, BLOCK // (5 * n * width * kind.itemsize)))
         kept = min(-(-(cut + 1) // 4) * 4, n // 2)  # kz = 0 ... K, and a few more for whole vector registers
         self.columns = pyfftw.zeros_aligned((5, n, kept), kind)
+        self.speed = 0.0
         self.row = np.empty((3, 2 * cut + 2), real)
         self.planes = pyfftw.zeros_aligned((pairs, 5, n, width), kind)
         self.inverse_x = _plan(self.columns[:3], 1, "FFTW_BACKWARD")
