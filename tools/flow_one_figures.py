@@ -80,7 +80,7 @@ def flow_one(folder: Path) -> None:
 def linear(folder: Path) -> None:
     found = runs(folder, "spectral_linear")
     lines = ["# Stationary linear forcing (constant power) with the spectral solver", ""]
-    head = ["cells", "Re_λ", "u'³/ε / box (0.19 expected)", "ε", "power", "turnovers k/ε", "turnovers L/u'"]
+    head = ["cells", "Re_λ", "u'³/ε / box (≈ 0.19)", "ε", "power", "turnovers k/ε", "turnovers L/u'"]
     lines += [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     for n, s in found.items():
