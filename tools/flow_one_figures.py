@@ -85,7 +85,7 @@ def linear(folder: Path) -> None:
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     for n, s in found.items():
         mean = {q: s.mean(q, SETTLE_LINEAR) for q in s.columns if q not in ("time", "power")}
-        # the ratio of means, u' and eps being those of the whole interval; error by that of the ratio's series
+        # the ratio of means over the whole interval, with the relative error of the ratio's series
         rms, eps = np.sqrt(2 / 3 * mean["kinetic_energy"].value), mean["dissipation"].value
         error = mean["dissipation_length"].error / mean["dissipation_length"].value
         ratio = rms**3 / eps / (2 * np.pi)
