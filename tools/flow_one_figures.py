@@ -80,22 +80,20 @@ def flow_one(folder: Path) -> None:
 def linear(folder: Path) -> None:
     found = runs(folder, "spectral_linear")
     lines = ["# Stationary linear forcing (constant power) with the spectral solver", ""]
-    lines += [
-        "| cells | Re_λ | u'³/ε / box (literature: 0.19) | ε | power | turnovers k/ε | turnovers L/u' |"
-    ]
-    lines += ["|---|---|---|---|---|---|---|"]
+    head = ["cells", "Re_λ", "u'³/ε / box (≈ 0.19)", "ε", "power", "turnovers k/ε", "turnovers L/u'"]
+    lines += [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     for n, s in found.items():
         mean = {q: s.mean(q, SETTLE_LINEAR) for q in s.columns if q not in ("time", "power")}
-        # the ratio of means, u' and eps being those of the whole interval; error by that of the ratio's series
+        # the ratio of means over the whole interval, with the relative error of the ratio's series
         rms, eps = np.sqrt(2 / 3 * mean["kinetic_energy"].value), mean["dissipation"].value
         error = mean["dissipation_length"].error / mean["dissipation_length"].value
         ratio = rms**3 / eps / (2 * np.pi)
         span = mean["dissipation"].duration
         eddies = [span * eps / mean["kinetic_energy"].value, span / mean["turnover_time"].value]
         lines.append(
-            f"| {n}³ | {mean['taylor_reynolds']} | {ratio:.4f} ± {ratio * error:.4f} | {mean['dissipation']} | "
-            f"{s['power'].mean():.6g} | {eddies[0]:.0f} | {eddies[1]:.0f} |"
+            f"| {n}³ | {mean['taylor_reynolds']} | {ratio:.4f} ± {ratio * error:.4f} | "
+            f"{mean['dissipation']} | {s['power'].mean():.6g} | {eddies[0]:.0f} | {eddies[1]:.0f} |"
         )
         axis.plot(s["time"], s["dissipation_length"] / (2 * np.pi), lw=0.8, label=f"{n}³")
     axis.axhline(0.19, color="k", lw=0.8, ls=":")

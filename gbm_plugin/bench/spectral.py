@@ -149,28 +149,24 @@ def _transforms_alone(solver: SpectralSolver) -> Callable[[], float]:
     """All transforms of one right-hand side, on buffers at rest."""
     operators = solver.operators
 
-    def columns(worker, start, stop):
-        for _ in range(start, stop):
-            worker.inverse_x.execute()
-            worker.forward_x.execute()
+    def columns(worker, first, last):
+        worker.inverse_x.execute()
+        worker.forward_x.execute()
 
     def planes(worker, first, buffers):
         worker.inverse(len(buffers))
         worker.forward(len(buffers))
 
-    def both():
-        operators._share(columns, operators.modes.shape[1])
-        operators._each_block(planes)
-
-    def clean():
+    def once() -> float:
         for worker in operators._workers:
             worker.columns[:] = 0
             worker.planes[:] = 0
         start = time.perf_counter()
-        both()
+        operators._each_column_block(columns)
+        operators._each_block(planes)
         return time.perf_counter() - start
 
-    return clean
+    return once
 
 
 def _full_transforms(cells: int, threads: int, precision: str) -> Callable[[], float]:

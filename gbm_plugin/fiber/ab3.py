@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit, prange
 
 from .ambient import SAMPLES
-from .free_drain import link_rates
 from .layout import rotated
+from .mobility import link_rates, work_rows
 from .simd import (
     add,
     add_scaled,
@@ -31,9 +31,9 @@ STAGES = 2  # times per step at which the flow is wanted: its start, and its mid
 TENSION_LIMIT = 0.38  # (6/11 − 0.206)/0.87: what bending at eq. (10) leaves of the stability limit
 
 
-def scratch_rows(beads: int) -> int:
+def scratch_rows(mobility: int, beads: int) -> int:
     """Scratch rows per thread for fibers of so many beads."""
-    return 30 * beads
+    return 24 * beads + work_rows(mobility, beads, implicit=False)
 
 
 def stable_step(fibers, softness: float, tension: float) -> float:
@@ -93,24 +93,26 @@ def turn_links(state, angles, factor, out):
 
 
 @njit(parallel=True, cache=True)
-def advance(state, newest, older, velocity, rotation, weights, steps, beta, radius, law, scratch, out, error, tension):
+def advance(
+    mobility, state, newest, older, velocity, rotation, weights, steps, beta, radius, law, scratch,
+    out, error, tension,
+):  # fmt: skip
     """One flow step in len(steps) sub-steps, for every block.
 
-    state → out (B, 3N, LANES); newest, older: the (2, B, 3N, LANES) rate histories before and after it, filled as
-    [0] given, [1] written; velocity, rotation: SAMPLES samples each; weights (sub-steps, STAGES, SAMPLES); steps: plan().
-    error (B, LANES): rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
+    state → out (B, 3N, LANES); newest, older: rates w_(n−1) and w_(n−2), each (given, written); velocity,
+    rotation: SAMPLES each; weights (sub-steps, STAGES, SAMPLES): of the samples; steps: plan(). error (B, LANES):
+    rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
     """
     count, rows = steps.shape[0], state.shape[1]
     links = rows // 3 - 1
     threads = scratch.shape[0]
     for thread in prange(threads):
         work = scratch[thread]
-        pivots, multipliers = work[: 2 * rows], work[2 * rows : 3 * rows]
-        flow, spin = work[3 * rows : 4 * rows], work[4 * rows : 5 * rows]
-        middle, rates = work[5 * rows : 6 * rows], work[6 * rows : 7 * rows]
+        multipliers, middle, rates = work[:rows], work[rows : 2 * rows], work[2 * rows : 3 * rows]
+        flow, spin, rest = work[3 * rows : 4 * rows], work[4 * rows : 5 * rows], work[8 * rows :]
         for b in range(thread, state.shape[0], threads):
             now, past, far = state[b], newest[0][b], older[0][b]
-            worst, pull = splat(0.0), splat(0.0)
+            worst, pull, stiffness = splat(0.0), splat(0.0), load(beta, b)
             for s in range(count):
                 h, start = steps[s, 0], steps[s, 7] == 1.0
                 if s == count - 1:
@@ -118,15 +120,15 @@ def advance(state, newest, older, velocity, rotation, weights, steps, beta, radi
                 elif s == count - 2:
                     w = older[1][b]
                 else:
-                    ring = (7 + s % 3) * rows
+                    ring = (5 + s % 3) * rows
                     w = work[ring : ring + rows]
-                u, spins = _blend(velocity, b, weights[s, 0], flow), _blend(rotation, b, weights[s, 0], spin)
-                pull = link_rates(now, u, spins, load(beta, b), radius, law, pivots, multipliers, w)
+                u, o = _blend(velocity, b, weights[s, 0], flow), _blend(rotation, b, weights[s, 0], spin)
+                pull = link_rates(mobility, now, u, o, stiffness, radius, law, rest, multipliers, w)
                 total = splat(0.0)
                 if start:
                     turn_links(now, w, 0.5 * h, middle)
-                    u, spins = _blend(velocity, b, weights[s, 1], flow), _blend(rotation, b, weights[s, 1], spin)
-                    pull = link_rates(middle, u, spins, load(beta, b), radius, law, pivots, multipliers, rates)
+                    u, o = _blend(velocity, b, weights[s, 1], flow), _blend(rotation, b, weights[s, 1], spin)
+                    link_rates(mobility, middle, u, o, stiffness, radius, law, rest, multipliers, rates)
                     turn_links(now, rates, h, out[b])
                     for i in range(links):
                         gap = scale(h, subtract(load3(rates, i), load3(w, i)))

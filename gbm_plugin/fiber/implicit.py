@@ -15,7 +15,7 @@ from numba import njit, prange
 
 from .ab3 import turn_links
 from .ambient import SAMPLES
-from .implicit_drain import stage, work_rows
+from .mobility import stage, work_rows
 from .simd import LANES, add, add_scaled, dot, load, load3, scale, smaller, splat, sqrt, store, store3, subtract
 
 D = 1 / (2 + np.sqrt(2))
@@ -25,9 +25,9 @@ RIGID = 2e7  # largest σβ: bending rates above 1e9/h follow the flow no closer
 FLOW_TIMES = np.array([D, 0.5, 1 - D])  # of the stages, in steps
 
 
-def scratch_rows(beads: int) -> int:
+def scratch_rows(mobility: int, beads: int) -> int:
     """Scratch rows per thread for fibers of so many beads."""
-    return 51 * beads + 8 + work_rows(beads)
+    return 51 * beads + 8 + work_rows(mobility, beads, implicit=True)
 
 
 @njit(forceinline=True)
@@ -75,8 +75,8 @@ def _blend(samples, weights, out):
 
 @njit(parallel=True, cache=True)
 def attempt(
-    members, source, lagged, velocity, rotation, times, beta, radius, law, tolerance, scratch,
-    trial, out, out_lagged, elapsed, step, error,
+    mobility, members, source, lagged, velocity, rotation, times, beta, radius, law, tolerance,
+    scratch, trial, out, out_lagged, elapsed, step, error,
 ):  # fmt: skip
     """One step of its own size for every fiber in members, accepted where the error estimate allows.
 
@@ -94,7 +94,7 @@ def attempt(
         u, spin = work[2 * rows : 3 * rows], work[3 * rows : 4 * rows]
         middle, new = work[4 * rows : 5 * rows], work[5 * rows : 6 * rows]
         k1, k2, k3 = work[6 * rows : 7 * rows], work[7 * rows : 8 * rows], work[8 * rows : 9 * rows]
-        history, multipliers = work[9 * rows : 10 * rows], work[10 * rows : 11 * rows]
+        history, tension = work[9 * rows : 10 * rows], work[10 * rows : 11 * rows]
         weights, sizes = work[17 * rows : 17 * rows + 3], work[17 * rows + 3 : 17 * rows + 8]
         rest = work[17 * rows + 8 :]
         eight = np.empty(LANES, np.int64)
@@ -121,17 +121,17 @@ def attempt(
                 if s == 0:
                     for row in range(rows):
                         store(history, row, splat(0.0))
-                    stage(now, u, spin, history, lag, sigma, stiff, radius, law, rest, multipliers, k1)
+                    stage(mobility, now, u, spin, history, lag, sigma, stiff, radius, law, rest, tension, k1)
                     turn_links(now, k1, 0.5 * h, middle)
                 elif s == 1:
                     for row in range(rows):
                         store(history, row, -load(k1, row))
-                    stage(middle, u, spin, history, multipliers, sigma, stiff, radius, law, rest, multipliers, k2)
+                    stage(mobility, middle, u, spin, history, tension, sigma, stiff, radius, law, rest, tension, k2)
                     turn_links(now, k2, h, new)
                 else:
                     for row in range(rows):
                         store(history, row, (E32 - 2.0) * load(k1, row) - E32 * load(k2, row))
-                    stage(new, u, spin, history, multipliers, sigma, stiff, radius, law, rest, multipliers, k3)
+                    stage(mobility, new, u, spin, history, tension, sigma, stiff, radius, law, rest, tension, k3)
             total = splat(0.0)
             for i in range(links):
                 gap = add_scaled(add(load3(k1, i), load3(k3, i)), -2.0, load3(k2, i))
@@ -152,7 +152,7 @@ def attempt(
                     for row in range(rows):
                         out[b, row, place] = new[row, lane]
                     for row in range(3 * links):
-                        out_lagged[b, row, place] = multipliers[row, lane]
+                        out_lagged[b, row, place] = tension[row, lane]
                 else:
                     for row in range(rows):
                         out[b, row, place] = now[row, lane]

@@ -141,6 +141,16 @@ def smaller(typingctx, left, right):
     return _chosen("<")
 
 
+@intrinsic
+def select_less(typingctx, left, right, then, otherwise):
+    """then in the lanes where left < right, else otherwise."""
+
+    def codegen(context, builder, signature, args):
+        return builder.select(builder.fcmp_ordered("<", args[0], args[1]), args[2], args[3])
+
+    return lanes(lanes, lanes, lanes, lanes), codegen
+
+
 # three-vectors are tuples of three lane numbers
 
 

@@ -10,10 +10,11 @@ from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .fibers import Fibers, one_of, positive
 from .layout import bead_positions, pack
+from .mobility import MOBILITIES
 from .simd import LANES
+from .strain import with_strain
 
 INTEGRATORS = ("ab3", "implicit", "auto")
-MOBILITIES = ("freeDrain",)
 TOLERANCE = 1e-4  # error estimate per accepted step: bead displacement over fiber length
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
 SMALLEST_STEP = 1e-12  # of a flow step, by implicit
@@ -47,13 +48,14 @@ class Stepper:
         self.fibers = fibers
         self.integrator = one_of("integrator", integrator, INTEGRATORS)
         self.mobility = one_of("mobility", mobility, MOBILITIES)
+        self._mobility = MOBILITIES.index(mobility)
         if strain_coupling and mobility == "freeDrain":
             raise ValueError("strain_coupling with mobility freeDrain has no effect; it needs rpy")
         self.need = "gradient" if strain_coupling else "rotation"
         self.tolerance = positive("tolerance", TOLERANCE if tolerance is None else tolerance)
         self.time = float(time)
         self.provisional = False
-        self._ambient = Ambient(fibers.count, fibers.beads, self.need)
+        self._ambient = Ambient(fibers.count, fibers.beads)
         self._beta = pack(velocity_scale(fibers))[:, 0]
         self._law = CURVATURE_LAWS.index(fibers.curvature_law)
         blocks, rows = -(-fibers.count // LANES), 3 * fibers.beads
@@ -76,8 +78,10 @@ class Stepper:
         self._counts = {"steps": 0, "substeps": 0, "refinements": 0, "refined_fibers": 0, "worst_error": 0.0}
 
     def _scratch_rows(self) -> int:
-        explicit = ab3.scratch_rows(self.fibers.beads)
-        return explicit if self.integrator == "ab3" else max(explicit, implicit.scratch_rows(self.fibers.beads))
+        explicit = ab3.scratch_rows(self._mobility, self.fibers.beads)
+        if self.integrator == "ab3":
+            return explicit
+        return max(explicit, implicit.scratch_rows(self._mobility, self.fibers.beads))
 
     @property
     def positions(self) -> np.ndarray:
@@ -99,7 +103,25 @@ class Stepper:
         """
         if time != self.time:
             raise ValueError(f"sample is of time {time:g}; the fibers are at time {self.time:g}")
+        velocity, extra = self._field("velocity", velocity, (3,)), self._field(
+            self.need, extra, (3, 3) if self.need == "gradient" else (3,)
+        )
+        if self.need == "gradient":
+            velocity, extra = with_strain(self.positions, velocity, extra, self.fibers.radius)
         self._ambient.observe(time, velocity, extra)
+
+    def _field(self, name, values, tail) -> np.ndarray:
+        """Sampled values, if they are (F, N, *tail) and finite."""
+        array, shape = np.asarray(values, dtype=float), (self.fibers.count, self.fibers.beads, *tail)
+        if array.shape != shape:
+            raise ValueError(f"sampled {name} has shape {array.shape}; it must be {shape}")
+        if not np.isfinite(array.sum()):
+            wrong = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))
+            raise FloatingPointError(
+                f"sampled {name} is not finite at fiber {wrong[0]}, time {self.time:g}, "
+                f"after step {self._counts['steps']}"
+            )
+        return array
 
     def advance(self, time_step) -> None:
         """Advance by time_step, extrapolating the samples in time along each bead's path.
@@ -165,7 +187,7 @@ class Stepper:
     def _explicit(self, count: int) -> np.ndarray:
         """All fibers by ab3 in count sub-steps; returns the error estimates (F,)."""
         fibers, h = self.fibers, self._length / count
-        times, (velocity, rotation, *_) = self._ambient.polynomial(self._start)
+        times, (velocity, rotation) = self._ambient.polynomial(self._start)
         weights = np.zeros((count, ab3.STAGES, SAMPLES))
         for s in range(count):
             for stage in range(ab3.STAGES):
@@ -174,7 +196,7 @@ class Stepper:
         error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
         new, old = self._spare
         ab3.advance(
-            self._last, (self._last_rates[0], new), (self._last_rates[1], old), velocity, rotation, weights,
+            self._mobility, self._last, (self._last_rates[0], new), (self._last_rates[1], old), velocity, rotation, weights,
             ab3.plan(self._last_ages, h, count), self._beta, fibers.radius, self._law, self._scratch,
             self._state, error, tension,
         )  # fmt: skip
@@ -189,7 +211,7 @@ class Stepper:
     def _implicit(self, members: np.ndarray) -> None:
         """The given fibers by linearly implicit steps, each with as many as its error estimate asks for."""
         fibers, end = self.fibers, self._length
-        times, (velocity, rotation, *_) = self._ambient.polynomial(self._start)
+        times, (velocity, rotation) = self._ambient.polynomial(self._start)
         elapsed, error, trial = np.zeros(fibers.count), np.zeros(fibers.count), np.zeros(fibers.count)
         source, lagged = self._last, self._last_multipliers
         attempts, refined = 0, np.zeros(0, dtype=int)
@@ -197,7 +219,7 @@ class Stepper:
             remaining = end - elapsed[members]
             trial[members] = remaining / np.ceil(np.maximum(remaining / self._step[members] * (1 - 1e-12), 1))
             implicit.attempt(
-                members, source, lagged, velocity, rotation, times, self._beta, fibers.radius, self._law,
+                self._mobility, members, source, lagged, velocity, rotation, times, self._beta, fibers.radius, self._law,
                 self.tolerance, self._scratch, trial, self._state, self._multipliers, elapsed, self._step, error,
             )  # fmt: skip
             source, lagged = self._state, self._multipliers

@@ -51,7 +51,7 @@ class Arrays:
         return out
 
     def to_physical(self, modes: Array, out: Array | None = None) -> Array:
-        """Real fields (m, n, n, n) at the nodes from modes (m, 2K+1, 2K+1, K+1), written to `out` if given."""
+        """Real fields (m, n, n, n) at the nodes, written to `out` if given; modes (m, 2K+1, 2K+1, K+1)."""
         n, cut = self.modes.cells, self.modes.cut
         out = self.xp.empty((len(modes), n, n, n), self.real) if out is None else out
         for source, target in zip(modes, out, strict=True):

@@ -92,31 +92,31 @@ def max_speed(planes, width):
 
 
 @jit
-def project(products, u, out, j, rows, kx, ky, kz, scale, linear, row):
-    """out = P [scale k.products + linear u] at the ky with index j, on real views.
+def project(products, u, out, first, last, rows, kx, ky, kz, scale, linear, row):
+    """out = P [scale k.products + linear u] at the ky with indices first ... last - 1, on real views.
 
-    products (5, n, >= 2K+2), holding -i times the products at all kx; u, out (3, 2K+1, 2K+1, 2K+2);
+    products (5, n, columns, >= 2K+2), holding -i times the products at all kx; u, out (3, 2K+1, 2K+1, 2K+2);
     kz (2K+2,); row (3, 2K+2) is scratch. Whole arrays are indexed, not parts of them: only so does the
     compiler see few enough of them to vectorise the loop (3.5 times faster).
     """
-    b = ky[j]
     for i in range(u.shape[1]):
-        a, r = kx[i], rows[i]
-        for s in range(kz.size):
-            c = kz[s]
-            xy, xz, yz = products[2, r, s], products[3, r, s], products[4, r, s]
-            x = scale * (a * products[0, r, s] + b * xy + c * xz) + linear * u[0, i, j, s]
-            y = scale * (a * xy + b * products[1, r, s] + c * yz) + linear * u[1, i, j, s]
-            z = scale * (a * xz + b * yz) + linear * u[2, i, j, s]
-            q = (a * x + b * y + c * z) / (a * a + b * b + c * c)
-            row[0, s] = x - a * q
-            row[1, s] = y - b * q
-            row[2, s] = z - c * q
-        if a == 0 and b == 0:  # the mean flow feels no force
-            row[:, :2] = 0
-        for m in range(3):
+        for j in range(first, last):
+            a, b, r, t = kx[i], ky[j], rows[i], j - first
             for s in range(kz.size):
-                out[m, i, j, s] = row[m, s]
+                c = kz[s]
+                xy, xz, yz = products[2, r, t, s], products[3, r, t, s], products[4, r, t, s]
+                x = scale * (a * products[0, r, t, s] + b * xy + c * xz) + linear * u[0, i, j, s]
+                y = scale * (a * xy + b * products[1, r, t, s] + c * yz) + linear * u[1, i, j, s]
+                z = scale * (a * xz + b * yz) + linear * u[2, i, j, s]
+                q = (a * x + b * y + c * z) / (a * a + b * b + c * c)
+                row[0, s] = x - a * q
+                row[1, s] = y - b * q
+                row[2, s] = z - c * q
+            if a == 0 and b == 0:  # the mean flow feels no force
+                row[:, :2] = 0
+            for m in range(3):
+                for s in range(kz.size):
+                    out[m, i, j, s] = row[m, s]
 
 
 @jit

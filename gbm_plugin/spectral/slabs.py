@@ -19,7 +19,7 @@ from gbm_plugin.spectral import kernels
 from gbm_plugin.spectral.arrays import Arrays, Term
 from gbm_plugin.spectral.modes import Modes
 
-BLOCK = 1 << 20  # bytes of plane buffers that one thread works on
+BLOCK = 1 << 20  # bytes of a buffer that one thread works on
 
 
 class Slabs(Arrays):
@@ -43,29 +43,30 @@ class Slabs(Arrays):
         kz = np.repeat(kz, 2)  # real and imaginary part
         linear = self.real.type(linear)
         source, target = u.view(self.real), out.view(self.real)
-        speeds = [0.0] * self.threads
+        for worker in self._workers:
+            worker.speed = 0.0
 
         def multiply(worker, first, planes):
             kernels.pack(mixed, first, planes, self._rows)
             worker.inverse(len(planes))
             view = planes.view(self.real)
             if want_speed:
-                speed = kernels.max_speed(view, 2 * n)
-                speeds[self._workers.index(worker)] = max(speeds[self._workers.index(worker)], speed)
+                worker.speed = max(worker.speed, kernels.max_speed(view, 2 * n))
             kernels.products(view, 2 * n)
             worker.forward(len(planes))
             kernels.unpack(planes, mixed, first, self._rows)
 
-        def finish(worker, j):
-            worker.columns[..., : mixed.shape[3]] = mixed[:, :, j]
+        def finish(worker, first, last):
+            worker.columns[:, :, : last - first, : mixed.shape[3]] = mixed[:, :, first:last]
             worker.forward_x.execute()
             products = worker.columns.view(self.real)
-            kernels.project(products, source, target, j, self._rows, kx, ky, kz, scale, linear, worker.row)
+            operands = (products, source, target, first, last, self._rows, kx, ky, kz)
+            kernels.project(*operands, scale, linear, worker.row)
 
         self._to_mixed(u)
         self._each_block(multiply)
-        self._share(lambda worker, start, stop: [finish(worker, j) for j in range(start, stop)], len(ky))
-        self.max_speed = max(speeds) if want_speed else None
+        self._each_column_block(finish)
+        self.max_speed = max(w.speed for w in self._workers) if want_speed else None
 
     def to_physical(self, modes, out=None):
         n = self.modes.cells
@@ -115,15 +116,25 @@ class Slabs(Arrays):
         """Points in x, modes in y and z, of up to three fields."""
         cut, mixed, count = self.modes.cut, self._mixed, len(u)
 
-        def column(worker, j):
-            buffer = worker.columns[:count, :, : cut + 1]
-            buffer[:, : cut + 1] = u[:, : cut + 1, j]
+        def start(worker, first, last):
+            buffer = worker.columns[:count, :, : last - first, : cut + 1]
+            buffer[:, : cut + 1] = u[:, : cut + 1, first:last]
             buffer[:, cut + 1 : -cut] = 0
-            buffer[:, -cut:] = u[:, cut + 1 :, j]
+            buffer[:, -cut:] = u[:, cut + 1 :, first:last]
             worker.inverse_x.execute()
-            mixed[:count, :, j] = buffer
+            mixed[:count, :, first:last] = buffer
 
-        self._share(lambda worker, start, stop: [column(worker, j) for j in range(start, stop)], 2 * cut + 1)
+        self._each_column_block(start)
+
+    def _each_column_block(self, work: Callable) -> None:
+        """work(worker, first, last) for all blocks of ky."""
+
+        def blocks(worker, start, stop):
+            step = worker.columns.shape[2]
+            for first in range(start, stop, step):
+                work(worker, first, min(first + step, stop))
+
+        self._share(blocks, len(self._rows))
 
     def _each_block(self, work: Callable) -> None:
         """work(worker, first plane, its plane buffers) for all blocks of plane pairs."""
@@ -154,7 +165,9 @@ class _Worker:
         width = n + 64 // kind.itemsize  # rows a power of two apart would fight for the same cache lines
         pairs = min(n // 2, max(1, BLOCK // (5 * n * width * kind.itemsize)))
         kept = min(-(-(cut + 1) // 4) * 4, n // 2)  # kz = 0 ... K, and a few more for whole vector registers
-        self.columns = pyfftw.zeros_aligned((5, n, kept), kind)
+        columns = min(2 * cut + 1, max(1, BLOCK // (5 * n * kept * kind.itemsize)))
+        self.columns = pyfftw.zeros_aligned((5, n, columns, kept), kind)
+        self.speed = 0.0
         self.row = np.empty((3, 2 * cut + 2), real)
         self.planes = pyfftw.zeros_aligned((pairs, 5, n, width), kind)
         self.inverse_x = _plan(self.columns[:3], 1, "FFTW_BACKWARD")

@@ -128,7 +128,7 @@ class TimeSeries:
         with open(path, "w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(self.columns)
-            writer.writerows(zip(*([f"{v:.10g}" for v in c] for c in self.columns.values()), strict=True))
+            writer.writerows(zip(*([f"{v:.7g}" for v in c] for c in self.columns.values()), strict=True))
 
     @classmethod
     def read(cls, path: Path | str) -> "TimeSeries":

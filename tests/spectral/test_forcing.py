@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from fields import abc, noise, taylor_green
 
 from gbm_plugin.spectral import EswaranPope, LinearForcing, SpectralSolver
 from gbm_plugin.spectral.forcing import half_shell
+
+from .fields import abc, noise, taylor_green
 
 
 def moving(forcing, n=16, **options):

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from fields import noise
 
 from gbm_plugin.spectral.arrays import Arrays
 from gbm_plugin.spectral.modes import Modes
 from gbm_plugin.spectral.slabs import Slabs
+
+from .fields import noise
 
 
 def pair(n, precision="double", threads=1):

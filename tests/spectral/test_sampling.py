@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from fields import noise, taylor_green
 
 from gbm_plugin.spectral import SpectralSolver
+
+from .fields import noise, taylor_green
 
 BOX = 3.0
 

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fields import abc, nodes, noise, taylor_green
 
 from gbm_plugin.spectral import EswaranPope, LinearForcing, SpectralSolver
 from gbm_plugin.spectral.arrays import Arrays
 from gbm_plugin.spectral.presets import PRESETS
 from gbm_plugin.statistics import turbulence
+
+from .fields import abc, nodes, noise, taylor_green
 
 # spectralDNS test suite (RK4): 32^3, nu = 0.000625, t = 0.1
 TAYLOR_GREEN = {"kinetic_energy": 0.124953117517, "enstrophy": 0.375249930801}

@@ -1,0 +1,317 @@
+"""Rotne–Prager–Yamakawa mobility: beads move and spin each other, overlapping ones too; dense solves per fiber.
+
+Tensors of Wajnryb, Mizerski, Zuk & Szymczak (2013) and Zuk et al. (2014) for equal spheres. Forces F are scaled by
+1/6πμa and torques T by 1/6πμa², so that all are velocities, and spins are times a. With r in units of a and n from
+bead j to bead i,
+
+    v_i = (A I + B n nᵀ) F_j + q T_j × n,       a ω_i = q F_j × n + ¾ (C I + D n nᵀ) T_j.
+
+All are continuous at contact, and the whole mobility is symmetric positive definite for any positions.
+"""
+
+from numba import njit
+
+from .bending import FOLD, moment
+from .layout import difference, mean_vector
+from .simd import (
+    add,
+    add_scaled,
+    cross,
+    dot,
+    larger,
+    load,
+    load3,
+    scale,
+    select_less,
+    splat,
+    sqrt,
+    store,
+    store3,
+    subtract,
+    zero3,
+)
+
+COEFFICIENTS = 8  # per pair: A, B, q, C, D, n
+
+
+@njit(forceinline=True)
+def pair(x):
+    """A, B, q, C, D and n of two spheres a distance x apart, in units of a."""
+    square = larger(dot(x, x), splat(1e-24))
+    r = sqrt(square)
+    i = 1.0 / r
+    i3 = i * i * i
+    far, r3 = splat(2.0), r * square
+    a = select_less(r, far, 1.0 - 9.0 / 32.0 * r, 0.75 * i + 0.5 * i3)
+    b = select_less(r, far, 3.0 / 32.0 * r, 0.75 * i - 1.5 * i3)
+    q = select_less(r, far, 0.375 * r - 9.0 / 64.0 * square, 0.75 * i * i)
+    c = select_less(r, far, 1.0 - 27.0 / 32.0 * r + 5.0 / 64.0 * r3, -0.5 * i3)
+    d = select_less(r, far, 9.0 / 32.0 * r - 3.0 / 64.0 * r3, 1.5 * i3)
+    return a, b, q, c, d, scale(i, x)
+
+
+@njit(forceinline=True)
+def response(pairs, i, j, force, torque):
+    """Velocity and spin of bead i from force and torque on bead j."""
+    if i == j:
+        return force, scale(0.75, torque)
+    high, low = max(i, j), min(i, j)
+    p = COEFFICIENTS * (high * (high - 1) // 2 + low)
+    a, b, q, c, d = (
+        load(pairs, p),
+        load(pairs, p + 1),
+        load(pairs, p + 2),
+        load(pairs, p + 3),
+        load(pairs, p + 4),
+    )
+    n = load(pairs, p + 5), load(pairs, p + 6), load(pairs, p + 7)
+    signed = q if i > j else -q
+    velocity = add_scaled(scale(a, force), b * dot(n, force), n)
+    spin = add_scaled(scale(0.75 * c, torque), 0.75 * d * dot(n, torque), n)
+    return add_scaled(velocity, signed, cross(torque, n)), add_scaled(spin, signed, cross(force, n))
+
+
+def work_rows(beads: int, implicit: bool) -> int:
+    """Rows of scratch for the explicit rates or the implicit stage of fibers of so many beads."""
+    n, m = 3 * (beads - 1), 3 * (beads - 2)
+    rows = COEFFICIENTS * beads * (beads - 1) // 2 + n * n + (n + 3) * n + 18 * beads
+    return rows + ((n + 3) * m + m * m + 2 * m + 2 * n + 24 * beads if implicit else 0)
+
+
+@njit(forceinline=True)
+def _parts(work, beads):
+    """The scratch shared by both: pairs, Cholesky factor, gap response, velocities, spins, other, rest."""
+    n = 3 * (beads - 1)
+    at = COEFFICIENTS * beads * (beads - 1) // 2
+    pairs, factor = work[:at], work[at : at + n * n]
+    at += n * n
+    gaps = work[at : at + (n + 3) * n]
+    at += (n + 3) * n
+    v, s = work[at : at + 3 * beads], work[at + 3 * beads : at + 6 * beads]
+    other = work[at + 6 * beads : at + 18 * beads]
+    return pairs, factor, gaps, v, s, other, work[at + 18 * beads :]
+
+
+@njit(forceinline=True)
+def _slip(state, v, s, i):
+    """v_i − v_(i+1) − e_i × (s_i + s_(i+1)): what rolling contact forbids."""
+    return subtract(scale(-1.0, difference(v, i)), cross(load3(state, i), add(load3(s, i), load3(s, i + 1))))
+
+
+@njit
+def assemble(state, radius, pairs, factor, gaps, v, s):
+    """Cholesky factor (lower, in place) of the constraint matrix, and the response of gaps to multipliers.
+
+    Column 3k + c of gaps (3N, 3(N−1)) holds, for a unit multiplier of link k, all v_(i+1) − v_i and the mean v.
+    """
+    links = state.shape[0] // 3 - 1
+    n = 3 * links
+    p = 0
+    for i in range(1, links + 1):
+        x = zero3()
+        for j in range(i - 1, -1, -1):  # from the nearest bead on: x = r_i − r_j
+            x = add_scaled(x, 2.0, load3(state, j))
+            a, b, q, c, d, unit = pair(x)
+            at = COEFFICIENTS * (p + j)
+            store(pairs, at, a)
+            store(pairs, at + 1, b)
+            store(pairs, at + 2, q)
+            store(pairs, at + 3, c)
+            store(pairs, at + 4, d)
+            store(pairs, at + 5, unit[0])
+            store(pairs, at + 6, unit[1])
+            store(pairs, at + 7, unit[2])
+        p += i
+    one, none = splat(1.0), splat(0.0)
+    for k in range(links):
+        e = load3(state, k)
+        for c in range(3):
+            force = (one if c == 0 else none, one if c == 1 else none, one if c == 2 else none)
+            torque = cross(e, force)
+            back = scale(-1.0, force)
+            for i in range(links + 1):
+                v1, s1 = response(pairs, i, k, force, torque)
+                v2, s2 = response(pairs, i, k + 1, back, torque)
+                store3(v, i, add(v1, v2))
+                store3(s, i, add(s1, s2))
+            column = 3 * k + c
+            for i in range(links):
+                gap = difference(v, i)
+                for d in range(3):
+                    store(gaps, (3 * i + d) * n + column, gap[d])
+                if i >= k:
+                    slip = _slip(state, v, s, i)
+                    for d in range(3):
+                        store(factor, (3 * i + d) * n + column, slip[d])
+            mean = mean_vector(v, links + 1)
+            for d in range(3):
+                store(gaps, (n + d) * n + column, mean[d])
+    for j in range(n):
+        total = load(factor, j * n + j)
+        for k in range(j):
+            total = total - load(factor, j * n + k) * load(factor, j * n + k)
+        diagonal = sqrt(total)
+        store(factor, j * n + j, diagonal)
+        inverse = 1.0 / diagonal
+        for i in range(j + 1, n):
+            total = load(factor, i * n + j)
+            for k in range(j):
+                total = total - load(factor, i * n + k) * load(factor, j * n + k)
+            store(factor, i * n + j, total * inverse)
+
+
+@njit
+def roll(state, factor, gaps, v, s, multipliers, out):
+    """Multipliers that stop the slip of velocities v and spins s; out: the gaps and mean velocity that result."""
+    links = state.shape[0] // 3 - 1
+    n = 3 * links
+    for i in range(links):
+        store3(multipliers, i, scale(-1.0, _slip(state, v, s, i)))
+    for i in range(n):
+        total = load(multipliers, i)
+        for k in range(i):
+            total = total - load(factor, i * n + k) * load(multipliers, k)
+        store(multipliers, i, total / load(factor, i * n + i))
+    for back in range(n):
+        i = n - 1 - back
+        total = load(multipliers, i)
+        for k in range(i + 1, n):
+            total = total - load(factor, k * n + i) * load(multipliers, k)
+        store(multipliers, i, total / load(factor, i * n + i))
+    for i in range(links):
+        store3(out, i, difference(v, i))
+    store3(out, links, mean_vector(v, links + 1))
+    for row in range(n + 3):
+        total = load(out, row)
+        for k in range(n):
+            total = total + load(gaps, row * n + k) * load(multipliers, k)
+        store(out, row, total)
+
+
+@njit
+def torques_to_motion(pairs, torques, v, s):
+    """Add to v and s what torques on all beads cause."""
+    beads = v.shape[0] // 3
+    for i in range(beads):
+        velocity, spin = load3(v, i), load3(s, i)
+        for j in range(beads):
+            dv, ds = response(pairs, i, j, zero3(), load3(torques, j))
+            velocity, spin = add(velocity, dv), add(spin, ds)
+        store3(v, i, velocity)
+        store3(s, i, spin)
+
+
+@njit
+def ambient(velocity, rotation, radius, v, s):
+    """v, s = the ambient velocity and a × rotation."""
+    for i in range(v.shape[0] // 3):
+        store3(v, i, load3(velocity, i))
+        store3(s, i, scale(radius, load3(rotation, i)))
+
+
+@njit(forceinline=True)
+def _joint_moment(state, j, law):
+    """Moment at bead j, none at the ends."""
+    if j < 1 or j > state.shape[0] // 3 - 2:
+        return zero3()
+    return moment(load3(state, j - 1), load3(state, j), law)
+
+
+@njit
+def link_rates(state, velocity, rotation, beta, radius, law, work, multipliers, rates):
+    """As free_drain.link_rates, with this mobility."""
+    links = state.shape[0] // 3 - 1
+    pairs, factor, gaps, v, s, other, _ = _parts(work, links + 1)
+    assemble(state, radius, pairs, factor, gaps, v, s)
+    ambient(velocity, rotation, radius, v, s)
+    torques = other[: 3 * links + 3]
+    for i in range(links + 1):
+        torque = subtract(_joint_moment(state, i + 1, law), _joint_moment(state, i - 1, law))
+        store3(torques, i, scale(4.0 / 3.0 * beta, torque))
+    torques_to_motion(pairs, torques, v, s)
+    roll(state, factor, gaps, v, s, multipliers, rates)
+    tension = splat(0.0)
+    for i in range(links):
+        e = load3(state, i)
+        pull = dot(e, load3(multipliers, i))
+        tension = larger(pull * pull, tension)
+        store3(rates, i, scale(0.5 / radius, cross(e, load3(rates, i))))
+    return tension
+
+
+@njit(forceinline=True)
+def _moment_change(state, g, j, law):
+    """Change of the moment at bead j (and the moment) when the links around it change by g."""
+    t, u = load3(state, j - 1), load3(state, j)
+    dt, du = load3(g, j - 1), load3(g, j)
+    bend, change = cross(t, u), add(cross(dt, u), cross(t, du))
+    if law == 1:
+        f = 2.0 / larger(1.0 + dot(t, u), splat(FOLD))
+        change = add_scaled(scale(f, change), -0.5 * f * f * (dot(dt, u) + dot(t, du)), bend)
+        bend = scale(f, bend)
+    return bend, change
+
+
+@njit
+def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, work, multipliers, rates):
+    """As implicit_drain.stage, with this mobility: the unknowns are the joint moments βM at links e + δe.
+
+    With W their response in the gaps 2a de/dt, and C the derivative of M, (I − βσ C W) βM = β (M + σ C g), g the
+    gaps without bending plus 2a κ × e: compliant and rigid joints alike are well conditioned.
+    """
+    links = state.shape[0] // 3 - 1
+    n, m = 3 * links, 3 * (links - 1)
+    pairs, factor, gaps, v, s, other, rest = _parts(work, links + 1)
+    bending, matrix = rest[: (n + 3) * m], rest[(n + 3) * m : (n + 3 + m) * m]
+    at = (n + 3 + m) * m
+    moments = rest[at : at + m]
+    at += m
+    free, g, gap = rest[at : at + n + 3], rest[at + n + 3 : at + 2 * n + 6], other[: n + 3]
+    assemble(state, radius, pairs, factor, gaps, v, s)
+    one, none = splat(1.0), splat(0.0)
+    for j in range(1, links):
+        for c in range(3):
+            unit = (one if c == 0 else none, one if c == 1 else none, one if c == 2 else none)
+            ahead, behind = scale(4.0 / 3.0, unit), scale(-4.0 / 3.0, unit)
+            for i in range(links + 1):
+                v1, s1 = response(pairs, i, j - 1, zero3(), ahead)
+                v2, s2 = response(pairs, i, j + 1, zero3(), behind)
+                store3(v, i, add(v1, v2))
+                store3(s, i, add(s1, s2))
+            roll(state, factor, gaps, v, s, multipliers, gap)
+            column = 3 * (j - 1) + c
+            for row in range(n + 3):
+                store(bending, row * m + column, load(gap, row))
+            for i in range(1, links):
+                _, change = _moment_change(state, gap, i, law)
+                for d in range(3):
+                    row = 3 * (i - 1) + d
+                    store(matrix, row * m + column, (one if row == column else none) - beta * sigma * change[d])
+    ambient(velocity, rotation, radius, v, s)
+    roll(state, factor, gaps, v, s, multipliers, free)
+    for i in range(links):
+        turned = cross(load3(history, i), load3(state, i))
+        store3(g, i, add_scaled(load3(free, i), 2.0 * radius, turned))
+    for j in range(1, links):
+        bend, change = _moment_change(state, g, j, law)
+        store3(moments, j - 1, scale(beta, add_scaled(bend, sigma, change)))
+    for k in range(m):
+        inverse = 1.0 / load(matrix, k * m + k)
+        for i in range(k + 1, m):
+            ratio = load(matrix, i * m + k) * inverse
+            for j in range(k + 1, m):
+                store(matrix, i * m + j, load(matrix, i * m + j) - ratio * load(matrix, k * m + j))
+            store(moments, i, load(moments, i) - ratio * load(moments, k))
+    for back in range(m):
+        i = m - 1 - back
+        total = load(moments, i)
+        for j in range(i + 1, m):
+            total = total - load(matrix, i * m + j) * load(moments, j)
+        store(moments, i, total / load(matrix, i * m + i))
+    for row in range(n + 3):
+        total = load(free, row)
+        for k in range(m):
+            total = total + load(bending, row * m + k) * load(moments, k)
+        store(rates, row, total)
+    for i in range(links):
+        store3(rates, i, scale(0.5 / radius, cross(load3(state, i), load3(rates, i))))
