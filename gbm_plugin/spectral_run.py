@@ -32,8 +32,9 @@ log = logging.getLogger(__name__)
 
 FLOW_FILE = "uniform/flow.npz"
 COLUMNS = (
-    "Time k epsilonBudget epsilonGradient epsilonLaplacian uPrime ReLambda eta A power meanUx meanUy meanUz"
-).split()
+    *("Time", "k", "epsilonBudget", "epsilonGradient", "epsilonLaplacian", "uPrime", "ReLambda", "eta"),
+    *("A", "power", "meanUx", "meanUy", "meanUz"),
+)
 
 
 def run_spectral(
@@ -138,7 +139,9 @@ class _Run:
         path = scene.case / "postProcessing/linearForcing" / name / "linearForcing.dat"
         path.parent.mkdir(parents=True, exist_ok=True)
         self.flow_table = path.open("w", buffering=1)
-        self.flow_table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")
+        self.flow_table.write(
+            "# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n"
+        )
 
     def to_the_end(self) -> bool:
         stop: list[int] = []

@@ -10,8 +10,8 @@ import time
 
 import numpy as np
 import pytest
-
 from conftest import gbm, make_case, run_case, set_entry
+
 from gbm_plugin.output.dat import read_dat
 from gbm_plugin.output.recording import open_recording
 
@@ -38,7 +38,7 @@ def test_both_engines_agree(whole, tmp_path):
     flow = read_dat(path / "postProcessing/linearForcing", "linearForcing.dat")
     with open_recording(path / "postProcessing/fibers") as recording:
         x = recording.families["test"].positions[:]
-    table, times, y = results(whole)
+    table, _, y = results(whole)
     np.testing.assert_allclose(flow["Time"], table["Time"], atol=1e-9)
     assert flow["k"][0] == pytest.approx(table["k"][0], rel=1e-12)
     np.testing.assert_allclose(flow["k"], table["k"], rtol=0.01)
@@ -64,7 +64,9 @@ def test_a_killed_run_continues_to_the_same_bits(whole, tmp_path):
     path = make_case(tmp_path / "case", cells=24, prepared=False)
     set_entry(path / "system/controlDict", "endTime", "0.3")
     run_case(path, *SPECTRAL)
-    (path / "spectral/0.3/uniform/fibers.npz").unlink()  # killed while it wrote: 0.2 is the latest complete time
+    (
+        path / "spectral/0.3/uniform/fibers.npz"
+    ).unlink()  # killed while it wrote: 0.2 is the latest complete time
     set_entry(path / "system/controlDict", "endTime", "0.4")
     done = run_case(path, *SPECTRAL)
     assert "continuing from time 0.2" in done.stdout

@@ -20,7 +20,12 @@ families {{ bench {{ count {fibers}; beads {beads}; length {length}; bendingStif
 
 
 def run(
-    case: Path | str, cells: int = 64, fibers: int = 1000, beads: int = 20, steps: int = 30, transport: str = "socket"
+    case: Path | str,
+    cells: int = 64,
+    fibers: int = 1000,
+    beads: int = 20,
+    steps: int = 30,
+    transport: str = "socket",
 ) -> dict:
     """Median seconds a step, of a copy of `case` with this many cells in each direction and one family.
 
@@ -40,12 +45,17 @@ def run(
             for entry, value in entries.items():
                 words = ("-disableFunctionEntries", "-entry", entry, "-set", str(value))
                 utility(copy, "foamDictionary", str(copy / name), *words)
-        text = FIBERS.format(transport=transport, fibers=fibers, beads=beads, length=0.1 * beads, never=10 * steps)
+        text = FIBERS.format(
+            transport=transport, fibers=fibers, beads=beads, length=0.1 * beads, never=10 * steps
+        )
         (copy / "constant/fiberProperties").write_text(text)
         run_case(copy)
         table = read_dat(copy / "postProcessing/fibers", "coupling.dat")
     late = slice(5, None)  # the first steps are corrected, and compile
-    parts = {name: float(np.median(table[name][late])) for name in ("wait", "derivative", "interpolation", "sending")}
+    parts = {
+        name: float(np.median(table[name][late]))
+        for name in ("wait", "derivative", "interpolation", "sending")
+    }
     step = float(np.median(np.diff(table["sentAt"])[late]))
     return {
         "cells": cells,
@@ -67,5 +77,7 @@ def table(result: dict) -> str:
     for name in ("wait", "derivative", "interpolation", "sending"):
         seconds = result[name]
         lines.append(f"    {name:<16}{1e3 * seconds:8.2f} ms {seconds / result['step']:8.1%}")
-    lines.append(f"    {'coupling':<16}{1e3 * result['step'] * result['share']:8.2f} ms {result['share']:8.1%}")
+    lines.append(
+        f"    {'coupling':<16}{1e3 * result['step'] * result['share']:8.2f} ms {result['share']:8.1%}"
+    )
     return "\n".join(lines)

@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
 TAIL = 4096  # bytes of a table that surely hold its last row
 
@@ -58,7 +59,9 @@ def newest_row(case: Path, pattern: str) -> dict[str, float]:
     with tables[-1].open("rb") as file:
         head = file.read(TAIL)
         file.seek(max(0, file.seek(0, 2) - TAIL))
-        lines = file.read().decode(errors="replace").split("\n")[:-1]  # what follows the last newline is partial
+        lines = (
+            file.read().decode(errors="replace").split("\n")[:-1]
+        )  # what follows the last newline is partial
     header = [line for line in head.decode(errors="replace").splitlines() if line.startswith("#")]
     try:
         names = header[-1].lstrip("# ").split()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
 from conftest import start_solver
+
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.coupling.channel import listen
 from gbm_plugin.coupling.message import (
@@ -31,7 +31,9 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
             assert channel is not None, (case / "log.pimpleFoam").read_text()[-3000:]
             first = channel.receive()
             hello = Hello.decode(first.payload)
-            channel.send(Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1)])))
+            channel.send(
+                Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1)]))
+            )
             step = first.step
             while True:
                 channel.send(Message(Kind.POSITIONS, step, 0.0, encode_array(positions)))

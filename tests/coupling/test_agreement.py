@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from conftest import divide, make_case, run_case
+
 from gbm_plugin.output.recording import open_recording
 
 STEPS = 20

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from conftest import make_case, start_solver
+
 from gbm_plugin.output.dat import read_dat
 
 STEPS = 15
@@ -20,7 +20,9 @@ def run(path, pause: float):
     """A run whose daemon sleeps `pause` seconds a step: seconds per step, and both sides' tables."""
     make_case(path, cells=40, steps=STEPS, time_step=0.005, tight=True)
     with (path / "log.gbmDaemon").open("w") as log:
-        daemon = subprocess.Popen([sys.executable, str(SLOW_DAEMON), str(path), str(pause)], stdout=log, stderr=log)
+        daemon = subprocess.Popen(
+            [sys.executable, str(SLOW_DAEMON), str(path), str(pause)], stdout=log, stderr=log
+        )
     solver = start_solver(path)
     try:
         assert solver.wait(240) == 0, (path / "log.pimpleFoam").read_text()[-2000:]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import fluidfoam
 import numpy as np
 import pytest
+from conftest import divide, set_entry
 from probe import probe
 
-from conftest import divide, set_entry
 from gbm_plugin.case.openfoam import utility
 
 BOX = 2 * np.pi
@@ -57,7 +57,9 @@ def test_velocity_and_rotation_are_those_of_the_written_fields(case, positions):
     utility(path, "postProcess", "-func", "vorticity", "-time", "0.2")
     u = read(path, "0.2", "U", 3)
     omega = read(path, "0.2", "vorticity", 3)
-    gradients = [(np.roll(u, -1, axis=1 + d) - np.roll(u, 1, axis=1 + d)) * CELLS / (2 * BOX) for d in range(3)]
+    gradients = [
+        (np.roll(u, -1, axis=1 + d) - np.roll(u, 1, axis=1 + d)) * CELLS / (2 * BOX) for d in range(3)
+    ]
     assert min(np.abs(g).max(axis=(1, 2, 3)).min() for g in gradients) > 0.1  # none of the nine vanishes
     # 12 digits are written
     np.testing.assert_allclose(velocity, trilinear(u, positions), atol=1e-11)
@@ -77,7 +79,9 @@ def test_gradient_on_the_wire_is_du_i_dx_j(case):
     assert np.abs(others).max() < 1e-12
 
 
-@pytest.mark.parametrize("division", [(2, (1, 1, 2)), (4, (2, 2, 1)), (3, None)], ids=["slabs", "columns", "manual"])
+@pytest.mark.parametrize(
+    "division", [(2, (1, 1, 2)), (4, (2, 2, 1)), (3, None)], ids=["slabs", "columns", "manual"]
+)
 def test_samples_do_not_depend_on_the_decomposition(case, positions, division):
     """The fields are the same at step 0, so that samples agree to rounding, points on rank faces included."""
     ranks, n = division
@@ -99,7 +103,10 @@ def test_a_rank_may_own_no_bead(case):
 @pytest.mark.parametrize("scheme", ["cell", "cellPoint", "cellPointFace", "pointMVC"])
 def test_openfoams_own_schemes(case, positions, scheme):
     """Each is second order or, for `cell`, first order: near the trilinear values, and the same on two ranks."""
-    path, parallel = case("serial", steps=1, interpolation=scheme), case("parallel", steps=1, interpolation=scheme)
+    path, parallel = (
+        case("serial", steps=1, interpolation=scheme),
+        case("parallel", steps=1, interpolation=scheme),
+    )
     divide(parallel, 2, (1, 1, 2))
     inside = positions[:40]
     _, samples = probe(path, inside)
@@ -107,7 +114,9 @@ def test_openfoams_own_schemes(case, positions, scheme):
     u = read(path, "0", "U", 3)
     distance = np.abs(samples[0][1] - trilinear(u, inside)).max()
     assert distance < (0.6 if scheme == "cell" else 0.2) * np.abs(u).max()
-    if scheme != "cellPointFace":  # whose tetrahedra differ beside the boundary between ranks, in OpenFOAM itself
+    if (
+        scheme != "cellPointFace"
+    ):  # whose tetrahedra differ beside the boundary between ranks, in OpenFOAM itself
         np.testing.assert_allclose(on_two[0][1], samples[0][1], atol=1e-12)
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from conftest import HEADER, make_case, set_entry, start_solver
+
 from gbm_plugin.output.dat import read_dat
 
 A, NU, CELLS = 0.5, 0.01, 16
 UNIFORM = "((0 0 0) (0.3 -0.2 0.1) (0 0 0))"
 SHEAR = "((0 2 0) (0 0 0) (-1 0 0))"  # u_x = sin 2y: an exact solution, as u . grad u = 0
 CONSTANT_A = f"linearForcing {{ type linearForcing; mode constantCoefficient; A {A}; }}"
-STOCK = """lundgren { type vectorSemiImplicitSource; selectionMode all; volumeMode specific;
-    injectionRateSuSp { U ((0 0 0) %g); } }""" % A
+STOCK = (
+    """lundgren { type vectorSemiImplicitSource; selectionMode all; volumeMode specific;
+    injectionRateSuSp { U ((0 0 0) %g); } }"""
+    % A
+)
 
 
 def run(path, modes: str, fv_options: str, time_step: float = 0.02, steps: int = 50, **options):
@@ -125,7 +128,10 @@ def test_a_restart_continues_the_forcing(tmp_path):
         ("linearForcing { type linearForcing; mode constantPower; power 1; A 1; }", "does not go with mode"),
         ("linearForcing { type linearForcing; mode steady; power 1; }", "constantCoefficient"),
         ("linearForcing { type linearForcing; mode constantPower; power -1; }", "must not be negative"),
-        ("linearForcing { type linearForcing; mode constantPower; power 1; pwoer 1; }", "unknown entry 'pwoer'"),
+        (
+            "linearForcing { type linearForcing; mode constantPower; power 1; pwoer 1; }",
+            "unknown entry 'pwoer'",
+        ),
     ],
 )
 def test_wrong_entries_are_named(tmp_path, option, message):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from conftest import DEFAULT_CASE, FAMILY, HEADER, gbm, start_solver
+
 from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
 
@@ -18,7 +18,9 @@ README = Path(__file__).parents[2] / "README.md"
 
 def foreign_case(path: Path, application: str) -> Path:
     """A periodic box with a vortex, as somebody might have it: other names, PISO, no forcing, times from 2."""
-    shutil.copytree(DEFAULT_CASE, path, ignore=shutil.ignore_patterns("0", "[1-9]*", "post*", "report", "log.*"))
+    shutil.copytree(
+        DEFAULT_CASE, path, ignore=shutil.ignore_patterns("0", "[1-9]*", "post*", "report", "log.*")
+    )
     for unwanted in ("constant/fiberProperties", "constant/fvOptions", "system/initialFieldDict"):
         (path / unwanted).unlink()
     (path / "0.orig").rename(path / "2")
@@ -57,7 +59,9 @@ def test_five_lines_and_a_dictionary(tmp_path, application):
         assert recording.times[0] == pytest.approx(2) and recording.times[-1] == pytest.approx(2.2)
     # a uniform flow carries every fiber as it is
     moved = x[-1] - x[0]
-    np.testing.assert_allclose(moved, np.broadcast_to(0.2 * np.array([0.5, 0.25, -1]), moved.shape), atol=1e-9)
+    np.testing.assert_allclose(
+        moved, np.broadcast_to(0.2 * np.array([0.5, 0.25, -1]), moved.shape), atol=1e-9
+    )
 
 
 def test_by_hand(tmp_path):

@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-
 from conftest import gbm, make_case, run_case
+
 from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
 
@@ -40,7 +40,9 @@ def test_foam_to_vtk_shows_the_cloud_beside_the_flow(finished, recording):
     assert list(finished.glob("VTK/*.vtm")) or list(finished.glob("VTK/**/internal.vtu"))
     cloud = ElementTree.parse(next(finished.glob("VTK/lagrangian/fibers/*.vtp")))
     arrays = {
-        a.get("Name"): np.array(a.text.split(), dtype=float) for a in cloud.iter("DataArray") if a.text is not None
+        a.get("Name"): np.array(a.text.split(), dtype=float)
+        for a in cloud.iter("DataArray")
+        if a.text is not None
     }
     expected = np.mod(last_positions(recording), 2 * np.pi)
     np.testing.assert_allclose(arrays["Points"].reshape(-1, 3), expected, atol=1e-5)
