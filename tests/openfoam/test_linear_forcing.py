@@ -12,11 +12,8 @@ A, NU, CELLS = 0.5, 0.01, 16
 UNIFORM = "((0 0 0) (0.3 -0.2 0.1) (0 0 0))"
 SHEAR = "((0 2 0) (0 0 0) (-1 0 0))"  # u_x = sin 2y: an exact solution, as u . grad u = 0
 CONSTANT_A = f"linearForcing {{ type linearForcing; mode constantCoefficient; A {A}; }}"
-STOCK = (
-    """lundgren { type vectorSemiImplicitSource; selectionMode all; volumeMode specific;
-    injectionRateSuSp { U ((0 0 0) %g); } }"""
-    % A
-)
+STOCK = f"""lundgren {{ type vectorSemiImplicitSource; selectionMode all; volumeMode specific;
+    injectionRateSuSp {{ U ((0 0 0) {A}); }} }}"""
 
 
 def run(path, modes: str, fv_options: str, time_step: float = 0.02, steps: int = 50, **options):
