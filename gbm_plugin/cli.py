@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import signal
 import sys
 from pathlib import Path
 
@@ -16,20 +17,30 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
-    from .coupling.channel import CouplingError
-    from .run import RunError
-
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        result = arguments.action(arguments)
-    except (ValueError, RuntimeError, OSError, FloatingPointError) as error:
+        from .coupling.channel import CouplingError
+        from .run import RunError
+
         expected = (ValueError, CouplingError, RunError, OSError, FloatingPointError)
+        result = arguments.action(arguments)
+    except MemoryError as error:
+        return _failed(arguments.command, f"not enough memory: {error}")
+    except KeyboardInterrupt:
+        return _failed(arguments.command, "stopped on request")
+    except Exception as error:
         if not isinstance(error, expected):
             raise
-        print(f"gbm {arguments.command}: {error}", file=sys.stderr)
-        return 1
+        return _failed(arguments.command, str(error))
     if result is not None and getattr(arguments, "json", None):
         Path(arguments.json).write_text(json.dumps(result, indent=2) + "\n")
     return 0
+
+
+def _failed(command: str, problem: str) -> int:
+    """One line, whatever the problem's text is."""
+    print(f"gbm {command}: {' '.join(problem.split())}", file=sys.stderr)
+    return 1
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import logging
 import os
 import signal
@@ -14,6 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .case.dictionary import CaseError
+from .case.lock import DAEMON, RUN, locked
+from .case.log import summary
 from .case.openfoam import command, environment, fatal_message
 from .case.prepare import prepare, ranks_of, reconstruct
 from .case.scene import Scene, read_scene
@@ -44,11 +45,11 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
             "linearForcing (gbm run --flow spectral runs this case)"
         )
     ranks = ranks_of(case, parallel)
-    with _only_run(case):
+    with _only_run(case) as lock:
         start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)
         prepare(scene, start, ranks)
         _remove_addresses(case)
-        _Pair(scene, ranks, start.time).run()
+        _Pair(scene, ranks, start.time, lock).run()
         if ranks > 1:
             reconstruct(case)
 
@@ -64,26 +65,17 @@ def run_spectral(case: Path | str, **options) -> None:
 
 
 @contextmanager
-def _only_run(case: Path) -> Iterator[None]:
-    """A lock that ends with this process, so that two runs never write into one case."""
-    try:
-        file = (case / ".gbm.lock").open("a+")
-    except OSError as error:
-        raise CaseError(f"cannot write in {case}: {error.strerror}") from None
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.seek(0)
-            raise CaseError(f"another run is under way in {case} (process {file.read().strip()})") from None
-        file.truncate(0)
-        file.write(f"{os.getpid()}\n")
-        file.flush()
-        yield
+def _only_run(case: Path) -> Iterator[int]:
+    """Two runs never write into one case, nor one beside a daemon that was started by hand. Yields the lock,
+    which solver and daemon hold too: should this process be killed, the next run waits for their end."""
+    with locked(case, RUN) as lock:
+        with locked(case, DAEMON):
+            pass
+        yield lock
 
 
 def _remove_addresses(case: Path) -> None:
-    """Addresses that a killed daemon left; a living one holds on to its socket and is not harmed."""
+    """Addresses that a killed daemon left."""
     for name in ("gbm.tcp", "exchange/session"):
         (case / name).unlink(missing_ok=True)
 
@@ -91,14 +83,18 @@ def _remove_addresses(case: Path) -> None:
 class _Pair:
     """The two processes of a run."""
 
-    def __init__(self, scene: Scene, ranks: int, start_time: float):
+    def __init__(self, scene: Scene, ranks: int, start_time: float, lock: int):
         self.scene = scene
         self.case = scene.case
         self.ranks = ranks
         self.start_time = start_time
         self.daemon_log = self.case / "log.gbmDaemon"
         self.solver_log = self.case / f"log.{scene.application}"
+        self.lock = lock
+        self.daemon: subprocess.Popen | None = None
+        self.solver: subprocess.Popen | None = None
         self.stopping = 0
+        self.ended_here: set[subprocess.Popen] = set()  # by this process, after the other side's end
 
     def run(self) -> None:
         # in sessions of their own: Ctrl-C reaches this process alone, which then ends both in order
@@ -107,27 +103,51 @@ class _Pair:
         handlers = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
         try:
             with self.daemon_log.open("w") as d, self.solver_log.open("w") as s:
-                self.daemon = _start(daemon, d)
-                self.solver = _start(solver, s)
+                # the cores that the solver leaves; one that they share, if it leaves none
+                cores = max(1, len(os.sched_getaffinity(0)) - self.ranks)
+                self.daemon = self._start(daemon, d, NUMBA_NUM_THREADS=str(cores))
+                self.solver = self._start(solver, s)
                 self._watch()
         finally:
             for number, handler in handlers.items():
                 signal.signal(number, handler)
-            for process in (getattr(self, "daemon", None), getattr(self, "solver", None)):
-                if process is not None:
-                    _end(process)
+            for process in filter(None, (self.solver, self.daemon)):
+                self._end(process)
         self._judge()
+
+    def _start(self, argv: list[str], output, **variables: str) -> subprocess.Popen:
+        return subprocess.Popen(
+            argv,
+            env=environment() | variables,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            pass_fds=(self.lock,),
+        )
+
+    def _end(self, process: subprocess.Popen) -> None:
+        """The process and all that it started are gone when this returns."""
+        if process.poll() is None:
+            self.ended_here.add(process)
+            process.terminate()
+            try:
+                process.wait(5)
+            except subprocess.TimeoutExpired:  # it hangs, or was stopped
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
 
     def _stop(self, *_) -> None:
         self.stopping += 1
         if self.stopping == 1:
             log.info("stopping: the flow is written after the step under way (once more: at once)")
-            self.daemon.terminate()  # which asks OpenFOAM to write and end
-        else:
+            if self.daemon is not None:
+                self.daemon.terminate()  # which asks OpenFOAM to write and end
+        elif self.solver is not None:
             self.solver.terminate()
 
     def _watch(self) -> None:
-        """Until both have ended; one that outlives the other by more than the grace time is ended."""
+        """Until both have ended, or one has outlived the other by the grace time."""
         alone_since = None
         with Progress(self.scene, self.start_time) as progress:
             while self.solver.poll() is None or self.daemon.poll() is None:
@@ -135,56 +155,41 @@ class _Pair:
                 progress.update()
                 if self.solver.poll() is None and self.daemon.poll() is None:
                     continue
-                alone_since = alone_since or time.monotonic()
-                if time.monotonic() - alone_since > GRACE:
-                    self.solver.terminate()
-                    self.daemon.terminate()
+                if alone_since is None:
+                    alone_since = time.monotonic()
+                    if self.solver.poll():  # a daemon that waits for a solver need not wait longer
+                        self.ended_here.add(self.daemon)
+                        self.daemon.terminate()
+                elif time.monotonic() - alone_since > GRACE:
+                    break
             progress.update()
 
     def _judge(self) -> None:
         solver, daemon = self.solver.returncode, self.daemon.returncode
+        problem = fatal_message(self.solver_log)
         if solver == 0 and daemon == 0:
             if self.stopping:
                 raise RunError(STOPPED)
+            log.info("%s: %s", self.scene.application, summary(self.solver_log))
             return
-        problem = fatal_message(self.solver_log)
+        if self.stopping and not problem:
+            raise RunError("stopped at once; the same command continues from the latest time that is written")
         daemon_problem = _last_error(self.daemon_log)
         name = self.scene.application
         causes = []
-        if solver < 0 and not problem:
+        # one that was ended here is not the cause
+        if solver < 0 and not problem and self.solver not in self.ended_here:
             causes.append(f"{name} was ended by {signal.Signals(-solver).name} ({self.solver_log})")
-        if daemon < 0:
+        if daemon < 0 and self.daemon not in self.ended_here:
             causes.append(f"the daemon was ended by {signal.Signals(-daemon).name} ({self.daemon_log})")
         if daemon > 0 and daemon_problem and (not problem or "the daemon stopped:" in problem):
-            causes.append(daemon_problem)
+            causes.append(f"{daemon_problem} ({self.daemon_log})")
         elif problem:
             causes.append(f"{name}: {problem} ({self.solver_log})")
         if not causes:
             codes = f"{name} ended with exit code {solver}, the daemon with {daemon}"
             causes.append(f"{codes} ({self.solver_log}, {self.daemon_log})")
         raise RunError("; ".join(causes))
-
-
-def _start(argv: list[str], output) -> subprocess.Popen:
-    return subprocess.Popen(
-        argv,
-        env=environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=output,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    )
-
-
-def _end(process: subprocess.Popen) -> None:
-    """The process and all that it started are gone when this returns."""
-    if process.poll() is None:
-        process.terminate()
-        try:
-            process.wait(5)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
 
 
 def _last_error(path: Path) -> str | None:

@@ -13,6 +13,7 @@ from .dictionary import CaseError, Dictionary
 
 log = logging.getLogger(__name__)
 
+WHY = " (fields or fiber state are missing: killed while writing, or a full disk)"
 STATE_FILE = "uniform/fibers.npz"
 PREVIOUS = "previous"
 
@@ -32,12 +33,24 @@ def time_folders(case: Path) -> dict[float, str]:
 
 
 def is_complete(case: Path, name: str) -> bool:
-    """Whether a time folder holds a velocity and a fiber state, together or decomposed."""
-    for folder in (case / name, case / "processor0" / name):
-        velocity = any((folder / f).is_file() for f in ("U", "U.gz"))
-        if velocity and (folder / STATE_FILE).is_file():
+    """Whether a time folder holds whole fields and a fiber state, together or decomposed."""
+    for folders in ([case / name], [p / name for p in case.glob("processor[0-9]*")]):
+        velocity = folders and all(any((f / u).is_file() for u in ("U", "U.gz")) for f in folders)
+        state = any((f / STATE_FILE).is_file() for f in folders)
+        if velocity and state and all(_is_whole(file) for f in folders for file in f.iterdir()):
             return True
     return False
+
+
+def _is_whole(file: Path) -> bool:
+    """False for an OpenFOAM file whose last line is missing: OpenFOAM does not notice that a disk is full."""
+    if not file.is_file():
+        return True
+    with file.open("rb") as content:
+        if b"FoamFile" not in content.read(2048):
+            return True
+        content.seek(-min(128, file.stat().st_size), 2)
+        return b"// ****" in content.read()
 
 
 @dataclass(frozen=True)
@@ -66,7 +79,7 @@ def choose_start(case: Path, start_time: float, end_time: float, time_step: floa
     if not complete:
         if _has_fibers(case):
             set_aside(case, start_time, everything=True)
-            log.info("no time folder is complete: starting again from time %g", start_time)
+            log.info("no time folder is complete%s: starting again from time %g", WHY, start_time)
             return Start(start_time, False)
         return Start(max(later), True)  # a developed flow, to which fibers are added
     latest = max(complete)
@@ -74,7 +87,12 @@ def choose_start(case: Path, start_time: float, end_time: float, time_step: floa
         log.info("the run to time %g is complete: starting a new one", latest)
         set_aside(case, start_time, everything=True)
         return Start(start_time, False)
-    log.info("continuing from time %g", latest)
+    incomplete = sorted(t for t in later if t > latest)
+    if incomplete:
+        names = ", ".join(f"{t:g}" for t in incomplete)
+        log.info("time %s is not complete%s: falling back to time %g", names, WHY, latest)
+    else:
+        log.info("continuing from time %g", latest)
     set_aside(case, latest, everything=False)
     return Start(latest, True)
 

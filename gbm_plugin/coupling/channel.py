@@ -1,4 +1,4 @@
-"""The daemon's side of a connection, whatever carries it: sockets (socket.py) or files (files.py)."""
+"""The daemon's side of a connection, whatever carries it: sockets (sockets.py) or files (files.py)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..case.scene import Coupling
-from .message import HEADER_SIZE, Kind, Message, ProtocolError, decode_header
+from .message import HEADER_SIZE, MAX_TEXT, Kind, Message, ProtocolError, decode_header
 
 
 class CouplingError(RuntimeError):
@@ -34,10 +34,11 @@ class Channel(ABC):
     def send(self, message: Message) -> None:
         self._write(message.encode())
 
-    def receive(self) -> Message:
-        """The next message. CouplingError where the solver is gone, silent, or reports an error."""
+    def receive(self, most: int = MAX_TEXT) -> Message:
+        """The next message, of at most so many bytes. CouplingError where the solver is gone, silent, or
+        reports an error."""
         try:
-            head, size = decode_header(self._read(HEADER_SIZE))
+            head, size = decode_header(self._read(HEADER_SIZE), most)
         except ProtocolError as error:
             raise self.error(str(error)) from None
         message = Message(head.kind, head.step, head.time, self._read(size), head.flags)
@@ -56,6 +57,8 @@ class Channel(ABC):
 
 class Listener(ABC):
     """Where one solver can find the daemon. A context manager that leaves nothing behind."""
+
+    token = ""  # what the solver must know where others can reach this place
 
     @abstractmethod
     def accept(self, give_up: Callable[[], bool]) -> Channel | None:

@@ -8,6 +8,7 @@ first steps, whose history is too short, are corrected with a second sample (`pr
 from __future__ import annotations
 
 import logging
+import secrets
 import signal
 import time as clock
 from pathlib import Path
@@ -16,10 +17,11 @@ import numpy as np
 
 from .. import __version__
 from ..case.dictionary import CaseError
+from ..case.lock import DAEMON, locked
 from ..case.scene import Family, Scene, read_scene
 from ..case.times import STATE_FILE
 from ..output.recording import FamilyRecord, Recorder
-from .channel import Channel, CouplingError, listen
+from .channel import Channel, CouplingError, Listener, listen
 from .fleet import Fleet
 from .message import (
     PROVISIONAL,
@@ -28,9 +30,11 @@ from .message import (
     Kind,
     Message,
     ProtocolError,
+    decode_folder,
     decode_sample,
     encode_array,
     encode_welcome,
+    sample_size,
 )
 from .steptable import StepTable
 
@@ -49,23 +53,45 @@ def serve(case: Path | str) -> None:
     case = Path(case).resolve()
     scene = read_scene(case)
     stop = _StopFlag()
-    with listen(case, scene.coupling) as listener:
+    with locked(case, DAEMON), listen(case, scene.coupling) as listener:
         log.info("waiting for OpenFOAM (%s)", scene.coupling.transport)
-        channel = listener.accept(give_up=lambda: bool(stop))
-        if channel is None:
-            log.info("stopped before OpenFOAM came")
-            return
+        while (channel := listener.accept(give_up=lambda: bool(stop))) is not None:
+            try:
+                if (first := _greeted(channel, listener)) is not None:
+                    Session(scene, channel, stop).run(*first)
+                    return
+            except Exception as error:
+                _say_why(channel, str(error))
+                raise
+            finally:
+                channel.close()
+        log.info("stopped before OpenFOAM came")
+
+
+def _greeted(channel: Channel, listener: Listener) -> tuple[Message, Hello] | None:
+    """The HELLO of the solver; None for a stranger, of whom a port that others can reach must not die."""
+    try:
+        message = channel.receive()
+        if message.kind is not Kind.HELLO:
+            raise channel.error(f"received {message.kind.name} where HELLO must come")
         try:
-            Session(scene, channel, stop, getattr(listener, "token", "")).run()
-        except Exception as error:
-            _say_why(channel, str(error))
+            hello = Hello.decode(message.payload)
+        except ProtocolError as error:
+            raise channel.error(str(error)) from None
+        if not secrets.compare_digest(hello.token.encode(), listener.token.encode()):
+            raise channel.error("the solver that connected has not the token of this daemon")
+    except CouplingError as error:
+        if not listener.token:
             raise
-        finally:
-            channel.close()
+        log.warning("refused a connection: %s", error)
+        _say_why(channel, str(error))
+        return None
+    return message, hello
 
 
 class _StopFlag:
-    """True once SIGINT or SIGTERM came: the run then ends after its next step, with everything written."""
+    """True once SIGINT or SIGTERM came: the run then ends after its next step, with everything written. A
+    second signal ends it at once."""
 
     def __init__(self) -> None:
         self._set = False
@@ -73,6 +99,8 @@ class _StopFlag:
             signal.signal(number, self._note)
 
     def _note(self, *_) -> None:
+        if self._set:
+            raise CouplingError("stopped by a second signal; what is recorded is kept")
         self._set = True
 
     def __bool__(self) -> bool:
@@ -89,18 +117,12 @@ def _say_why(channel: Channel, text: str) -> None:
 class Session:
     """One run of the solver, from HELLO to GOODBYE."""
 
-    def __init__(self, scene: Scene, channel: Channel, stop: _StopFlag, token: str):
+    def __init__(self, scene: Scene, channel: Channel, stop: _StopFlag):
         self.scene = scene
         self.channel = channel
         self.stop = stop
-        self.token = token
 
-    def run(self) -> None:
-        first = self._receive(Kind.HELLO)
-        try:
-            hello = Hello.decode(first.payload)
-        except ProtocolError as error:
-            raise self.channel.error(str(error)) from None
+    def run(self, first: Message, hello: Hello) -> None:
         self._check(hello)
         self.step, self.time = first.step, first.time
         self.time_step = hello.time_step
@@ -119,7 +141,7 @@ class Session:
             self.table.close()
 
     def _receive(self, *kinds: Kind) -> Message:
-        message = self.channel.receive()
+        message = self.channel.receive(sample_size(self.fleet.beads, self.fleet.need))
         if message.kind not in kinds:
             expected = " or ".join(k.name for k in kinds)
             raise self.channel.error(f"received {message.kind.name} where {expected} must come")
@@ -127,8 +149,6 @@ class Session:
 
     def _check(self, hello: Hello) -> None:
         """Compare what OpenFOAM runs with to the case that this daemon read."""
-        if hello.token != self.token:
-            raise self.channel.error("the solver that connected has not the token of this daemon")
         pairs = [
             ("nu", hello.viscosity, self.scene.viscosity),
             ("deltaT", hello.time_step, self.scene.time_step),
@@ -199,19 +219,17 @@ class Session:
             self._send_positions()
             message = self._receive(Kind.SAMPLE, Kind.SAVE, Kind.END)
             if message.kind is Kind.END:
+                self._check_step(message, self.step - 1, self.time - self.time_step)
                 self._goodbye(message)
                 return False
-            folder = None
-            if message.kind is Kind.SAVE:
-                folder = self.scene.case / message.payload.decode()
-                message = self._receive(Kind.SAMPLE)
-            if message.step != self.step or abs(message.time - self.time) > 1e-6 * self.time_step:
-                raise self.channel.error(
-                    f"SAMPLE is of step {message.step}, time {message.time:g}; "
-                    f"step {self.step}, time {self.time:g} must come"
-                )
-            self.arrived_at = clock.time()
+            self._check_step(message, self.step, self.time)
             try:
+                folder = None
+                if message.kind is Kind.SAVE:
+                    folder = self.scene.case / decode_folder(message.payload)
+                    message = self._receive(Kind.SAMPLE)
+                    self._check_step(message, self.step, self.time)
+                self.arrived_at = clock.time()
                 velocity, extra = decode_sample(message, self.fleet.beads, self.fleet.need)
             except ProtocolError as error:
                 raise self.channel.error(str(error)) from None
@@ -225,6 +243,13 @@ class Session:
             if folder is not None:
                 self.fleet.save(folder, self.step, self.time)
             return True
+
+    def _check_step(self, message: Message, step: int, time: float) -> None:
+        if message.step != step or abs(message.time - time) > 1e-6 * self.time_step:
+            raise self.channel.error(
+                f"{message.kind.name} is of step {message.step}, time {message.time:g}; "
+                f"step {step}, time {time:g} must come"
+            )
 
     def _watch(self, velocity: np.ndarray) -> None:
         """The gap between predicted and received flow is an error that no estimate inside the fibers sees."""

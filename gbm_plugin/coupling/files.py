@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..case.scene import Coupling
 from .channel import Channel, CouplingError, Listener
-from .message import HEADER_SIZE, Message, ProtocolError, decode_header
+from .message import HEADER_SIZE, MAX_TEXT, Message
 from .sockets import POLL, write_secret
 
 
@@ -39,15 +39,14 @@ class FileChannel(Channel):
             raise self.error(f"cannot write {target}: {error.strerror}") from None
         self._sent += 1
 
-    def receive(self) -> Message:
-        self._data = self._next_file()
-        with contextlib.suppress(ProtocolError):
-            size = decode_header(self._data[:HEADER_SIZE])[1]
-            if len(self._data) != HEADER_SIZE + size:
-                raise self.error(f"message of the wrong length in {self._folder}")
-        return super().receive()
+    def receive(self, most: int = MAX_TEXT) -> Message:
+        self._data = self._next_file(HEADER_SIZE + max(most, MAX_TEXT))
+        message = super().receive(most)
+        if self._data:
+            raise self.error(f"{message.kind.name} of step {message.step} is followed by {len(self._data)} bytes")
+        return message
 
-    def _next_file(self) -> bytes:
+    def _next_file(self, most: int) -> bytes:
         path = self.incoming()
         deadline = time.monotonic() + self.timeout
         pause = 5e-5
@@ -56,8 +55,12 @@ class FileChannel(Channel):
                 raise self.silent()
             time.sleep(pause)
             pause = min(1.1 * pause, 0.02)  # a part of what was waited for already: hardly late, never busy
-        data = path.read_bytes()
-        path.unlink()
+        try:
+            with path.open("rb") as file:
+                data = file.read(most + 1)
+            path.unlink()
+        except OSError as error:
+            raise self.error(f"cannot read {path}: {error.strerror}") from None
         self._received += 1
         return data
 
@@ -82,7 +85,8 @@ class FileListener(Listener):
         try:
             self.folder.mkdir(mode=0o700, exist_ok=True)
             for stale in self.folder.iterdir():
-                stale.unlink()
+                if stale.name != "session":  # which is replaced: a solver may be waiting with the old one
+                    stale.unlink()
         except OSError as error:
             raise CouplingError(f"cannot use the folder {self.folder}: {error.strerror}") from None
         write_secret(self.folder / "session", self.session + "\n")

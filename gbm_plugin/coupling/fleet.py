@@ -144,7 +144,7 @@ class Fleet:
         try:
             with np.load(path) as data:
                 if str(data["signature"]) != self._signature():
-                    raise ValueError(
+                    raise CaseError(
                         f"{path} holds the families {data['signature']} (name, count, beads, length), "
                         f"constant/fiberProperties says {self._signature()}: "
                         "restore the dictionary, or start afresh"
@@ -152,8 +152,10 @@ class Fleet:
                 for family, stepper in zip(self.families, self.steppers, strict=True):
                     prefix = f"{family.name}/"
                     stepper.restore({k.removeprefix(prefix): data[k] for k in data.files if k.startswith(prefix)})
-        except (OSError, KeyError, zipfile.BadZipFile) as error:
-            raise ValueError(f"the fiber state {path} cannot be read: {error}") from None
+        except CaseError:
+            raise
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise CaseError(f"the fiber state {path} cannot be read: {error}") from None
 
 
 def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int, int]) -> np.ndarray | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+import re
 import struct
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ import numpy as np
 
 MAGIC = b"GBMC"
 VERSION = 1
-MAX_SIZE = 1 << 36  # no payload is larger [bytes]
+MAX_TEXT = 65536  # longest payload of all but POSITIONS and SAMPLE [bytes]
 
 _HEADER = struct.Struct("<4sHHIIqdQ")
 HEADER_SIZE = _HEADER.size
@@ -51,8 +52,11 @@ def encode_header(m: Message) -> bytes:
     return _HEADER.pack(MAGIC, VERSION, m.kind, m.flags, 0, m.step, m.time, len(m.payload))
 
 
-def decode_header(data: bytes) -> tuple[Message, int]:
-    """The message without its payload, and the payload's size [bytes]. ProtocolError where it is none."""
+def decode_header(data: bytes, most: int = MAX_TEXT) -> tuple[Message, int]:
+    """The message without its payload, and the payload's size, at most `most` [bytes].
+
+    ProtocolError where it is none.
+    """
     if len(data) != HEADER_SIZE:
         raise ProtocolError(f"short message: {len(data)} bytes where a header has {HEADER_SIZE}")
     magic, version, kind, flags, _, step, time, size = _HEADER.unpack(data)
@@ -65,8 +69,8 @@ def decode_header(data: bytes) -> tuple[Message, int]:
         )
     if kind not in Kind.__members__.values():
         raise ProtocolError(f"message of unknown kind {kind}")
-    if size > MAX_SIZE:
-        raise ProtocolError(f"{Kind(kind).name} announces {size} bytes: not a message")
+    if size > max(most, MAX_TEXT):
+        raise ProtocolError(f"{Kind(kind).name} announces {size} bytes where at most {most} are expected")
     if not math.isfinite(time):
         raise ProtocolError(f"{Kind(kind).name} of step {step} has the time {time}")
     return Message(Kind(kind), step, time, flags=flags), size
@@ -99,12 +103,20 @@ class Hello:
         *values, length = cls._FIXED.unpack(payload[:size])
         if not all(map(math.isfinite, values)) or not 0 <= length <= len(payload) - size:
             raise ProtocolError("HELLO holds values that are not finite, or a folder that is cut off")
+        folder = decode_folder(payload[size : size + length])
         try:
-            folder = payload[size : size + length].decode()
             token = payload[size + length :].decode()
         except UnicodeDecodeError:
-            raise ProtocolError("HELLO holds a text that is not UTF-8") from None
+            raise ProtocolError("HELLO holds a token that is not UTF-8") from None
         return cls(values[0], values[1], tuple(values[2:5]), tuple(values[5:8]), int(values[8]), folder, token)
+
+
+def decode_folder(data: bytes) -> str:
+    """The name of a time folder, that of a processor before it or not; ProtocolError for any other place."""
+    folder = data.decode(errors="replace")
+    if not re.fullmatch(r"(processor\d+/)?[-+.\w]*\d[-+.\w]*", folder, flags=re.ASCII):
+        raise ProtocolError(f"'{folder[:80]}' is not a time folder")
+    return folder
 
 
 NEEDS = ("velocity", "rotation", "gradient")
@@ -120,16 +132,21 @@ def encode_array(values: np.ndarray) -> bytes:
     return np.ascontiguousarray(values, dtype="<f8").tobytes()
 
 
+def sample_size(beads: int, need: str) -> int:
+    """Bytes of a SAMPLE."""
+    return 8 * beads * {"velocity": 3, "rotation": 6, "gradient": 12}[need]
+
+
 def decode_sample(m: Message, beads: int, need: str) -> tuple[np.ndarray, np.ndarray | None]:
     """Velocity (B, 3) and rotation (B, 3) or gradient (B, 3, 3), [b, i, j] = du_i/dx_j.
 
     ProtocolError where the length is wrong or a value is not finite.
     """
     extra = {"velocity": (), "rotation": (3,), "gradient": (3, 3)}[need]
-    numbers = beads * (3 + int(np.prod(extra)) * (need != "velocity"))
-    if len(m.payload) != 8 * numbers:
+    size = sample_size(beads, need)
+    if len(m.payload) != size:
         raise ProtocolError(
-            f"SAMPLE of step {m.step} has {len(m.payload)} bytes: {beads} beads with {need} need {8 * numbers}"
+            f"SAMPLE of step {m.step} has {len(m.payload)} bytes: {beads} beads with {need} need {size}"
         )
     values = np.frombuffer(m.payload, dtype="<f8")
     if not np.all(np.isfinite(values)):

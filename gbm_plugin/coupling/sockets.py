@@ -15,6 +15,7 @@ from ..case.scene import Coupling
 from .channel import Channel, CouplingError, Listener
 from .message import Kind, Message
 
+PARTING = 1.0  # how long the other side may take to end a connection [s]
 POLL = 0.2  # how often a wait for the first connection looks whether to give up [s]
 
 
@@ -46,9 +47,7 @@ class SocketChannel(Channel):
         with second, contextlib.suppress(OSError):
             second.settimeout(1.0)
             second.sendall(Message(Kind.ERROR, 0, 0.0, text).encode())
-            second.shutdown(socket.SHUT_WR)
-            while second.recv(4096):  # unread bytes would reset the connection before it has read the text
-                pass
+            _part(second)
 
     def _write(self, data: bytes) -> None:
         deadline = time.monotonic() + self.timeout
@@ -79,7 +78,20 @@ class SocketChannel(Channel):
         return bytes(data)
 
     def close(self) -> None:
+        with contextlib.suppress(OSError):
+            _part(self._socket)
         self._socket.close()
+
+
+def _part(connection: socket.socket) -> None:
+    """Take what is on its way: bytes that nobody reads would reset the connection before the other side has
+    read our last word. For a moment only, however much it sends."""
+    connection.shutdown(socket.SHUT_WR)
+    end = time.monotonic() + PARTING
+    while (left := end - time.monotonic()) > 0:
+        connection.settimeout(left)
+        if not connection.recv(1 << 16):
+            return
 
 
 class SocketListener(Listener):

@@ -36,7 +36,8 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
             )
             step = first.step
             while True:
-                channel.send(Message(Kind.POSITIONS, step, 0.0, encode_array(positions)))
+                time = first.time + (step - first.step) * hello.time_step
+                channel.send(Message(Kind.POSITIONS, step, time, encode_array(positions)))
                 message = channel.receive()
                 if message.kind is Kind.SAVE:
                     message = channel.receive()

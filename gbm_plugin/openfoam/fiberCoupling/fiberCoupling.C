@@ -167,20 +167,10 @@ void Foam::functionObjects::fiberCoupling::shakeHands
         hello.appendText(daemon_->token());
         daemon_->send(hello);
 
-        const message welcome(daemon_->receive(message::WELCOME, step_));
-        std::size_t offset = 0;
-        std::int64_t n;
-        welcome.extract(offset, &ambient_, 1);
-        welcome.extract(offset, &n, 1);
-        families_.setSize(n);
-        for (fiberFamily& f : families_)
-        {
-            std::int64_t size[2];
-            welcome.extract(offset, size, 2);
-            f.count = size[0];
-            f.beads = size[1];
-            beads_ += f.count*f.beads;
-        }
+        readWelcome
+        (
+            daemon_->receive(message::WELCOME, step_, 32, message::maxText)
+        );
 
         Info<< type() << ": " << families_.size() << " families with "
             << beads_ << " beads, daemon on " << daemon_->peer().c_str()
@@ -207,6 +197,35 @@ void Foam::functionObjects::fiberCoupling::shakeHands
 }
 
 
+void Foam::functionObjects::fiberCoupling::readWelcome(const message& m)
+{
+    // what to sample, how many families, then fibers and beads of each
+    const std::vector<std::int64_t> n(m.values<std::int64_t>());
+
+    bool valid = n[0] >= NOTHING && n[0] <= GRADIENT
+     && m.payload.size() == sizeof(std::int64_t)*n.size()
+     && n.size() % 2 == 0 && n[1] == std::int64_t(n.size()/2 - 1);
+
+    std::int64_t beads = 0;
+    for (std::size_t i = 2; valid && i < n.size(); i += 2)
+    {
+        valid = n[i] > 0 && n[i + 1] > 0 && n[i] <= labelMax/n[i + 1];
+        if (valid)
+        {
+            beads += n[i]*n[i + 1];
+            families_.append({label(n[i]), label(n[i + 1])});
+        }
+    }
+    if (!valid || beads > labelMax)
+    {
+        daemon_->fail("WELCOME holds numbers that are not allowed");
+    }
+
+    ambient_ = n[0];
+    beads_ = beads;
+}
+
+
 bool Foam::functionObjects::fiberCoupling::receivePositions
 (
     List<point>& positions,
@@ -219,13 +238,32 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
 
     if (Pstream::master())
     {
-        const message m(daemon_->receive(message::POSITIONS, step_));
+        const std::uint64_t size = std::uint64_t(beads_)*sizeof(point);
+        const message m(daemon_->receive(message::POSITIONS, step_, size));
         provisional = m.head.flags & message::provisional;
         stop = m.head.flags & message::stop;
 
-        std::size_t offset = 0;
+        if (!(mag(m.head.time - time_.value()) <= 1e-6*deltaT_))
+        {
+            daemon_->fail
+            (
+                "POSITIONS are of time " + Foam::name(m.head.time)
+              + ", expected time " + Foam::name(time_.value())
+            );
+        }
+
         positions.setSize(beads_);
-        m.extract(offset, positions.begin(), beads_);
+        std::memcpy(positions.begin(), m.payload.data(), size);
+        forAll(positions, i)
+        {
+            if (!std::isfinite(magSqr(positions[i])))
+            {
+                daemon_->fail
+                (
+                    "POSITIONS are not finite at bead " + std::to_string(i)
+                );
+            }
+        }
     }
 
     Pstream::scatter(provisional);
@@ -357,15 +395,16 @@ void Foam::functionObjects::fiberCoupling::exchange()
         sampler_->locate(positions);
         t.interpolation += watch.lap();
 
+        // before the daemon writes its state, which completes a time folder
+        if (writeCloud_ && time_.writeTime() && !provisional)
+        {
+            writeFiberCloud(mesh_, sampler_(), families_);
+        }
+
         sendSample(provisional, t);
     }
 
     writeTimes(t, arrived, timeOfDay());
-
-    if (writeCloud_ && time_.writeTime())
-    {
-        writeFiberCloud(mesh_, sampler_(), families_);
-    }
 }
 
 
@@ -464,8 +503,13 @@ bool Foam::functionObjects::fiberCoupling::end()
         daemon_->send(message(message::END, step_, time_.value()));
 
         // the daemon is one step ahead: its last positions are not needed
-        daemon_->receive(message::POSITIONS, step_ + 1);
-        daemon_->receive(message::GOODBYE, step_);
+        daemon_->receive
+        (
+            message::POSITIONS,
+            step_ + 1,
+            std::uint64_t(beads_)*sizeof(point)
+        );
+        daemon_->receive(message::GOODBYE, step_, 0);
         daemon_.clear();
     }
 

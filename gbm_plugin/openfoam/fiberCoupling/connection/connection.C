@@ -81,11 +81,13 @@ void Foam::connection::send(const message& m)
 Foam::message Foam::connection::receive
 (
     message::type expected,
-    std::int64_t step
+    std::int64_t step,
+    std::uint64_t least,
+    std::uint64_t most
 )
 {
     message m;
-    read(m);
+    read(m, most);
 
     if (m.head.type == message::ERROR)
     {
@@ -99,12 +101,20 @@ Foam::message Foam::connection::receive
           + m.name()
         );
     }
-    if (expected != message::WELCOME && m.head.step != step)
+    if (m.head.step != step)
     {
         fail
         (
             m.name() + " is of step " + std::to_string(m.head.step)
           + ", expected step " + std::to_string(step)
+        );
+    }
+    if (m.head.size < least || m.head.size > most)
+    {
+        fail
+        (
+            m.name() + " has " + std::to_string(m.head.size)
+          + " bytes, expected " + std::to_string(least)
         );
     }
 

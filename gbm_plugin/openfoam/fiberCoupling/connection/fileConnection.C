@@ -84,7 +84,7 @@ void Foam::fileConnection::write(const message& m)
 }
 
 
-void Foam::fileConnection::read(message& m)
+void Foam::fileConnection::read(message& m, std::uint64_t most)
 {
     fileName source(path("fibers", received_++));
     const auto end = deadline();
@@ -93,9 +93,15 @@ void Foam::fileConnection::read(message& m)
     // Sleeps that grow with the wait: short beside what was waited for
     // already, so late by 10 % at most and never busy
     std::ifstream is;
-    while (!(is.open(source, std::ios::binary), is.is_open()))
+    while (true)
     {
+        // asked before the file is: a daemon's last word precedes its end
         const std::string now = session();
+        is.open(source, std::ios::binary);
+        if (is.is_open())
+        {
+            break;
+        }
         if (now != session_)
         {
             if (received_ > 1 || now.empty())
@@ -125,7 +131,11 @@ void Foam::fileConnection::read(message& m)
     {
         fail("short message in " + source);
     }
-    m.check(peer_);
+    const string problem(m.problem(most));
+    if (!problem.empty())
+    {
+        fail(problem);
+    }
 
     is.seekg(0, std::ios::end);
     if (std::uint64_t(is.tellg()) != sizeof(m.head) + m.head.size)

@@ -1,5 +1,4 @@
 #include "message.H"
-#include <cstring>
 
 static_assert
 (
@@ -35,26 +34,24 @@ Foam::string Foam::message::name() const
 }
 
 
-void Foam::message::check(const string& peer) const
+Foam::string Foam::message::problem(std::uint64_t most) const
 {
     if (std::memcmp(head.magic, "GBMC", 4) != 0)
     {
-        FatalErrorInFunction
-            << "what answers on " << peer.c_str()
-            << " is not a gbm daemon" << exit(FatalError);
+        return "what answers is not a gbm daemon";
     }
     if (head.version != version)
     {
-        FatalErrorInFunction
-            << "the daemon on " << peer.c_str() << " speaks version "
-            << label(head.version) << " of the coupling protocol, this plugin "
-            << label(version) << ": rebuild the plugin with ./Allwmake"
-            << exit(FatalError);
+        return
+            "the daemon speaks version " + std::to_string(head.version)
+          + " of the coupling protocol, this plugin " + std::to_string(version)
+          + ": rebuild the plugin with ./Allwmake";
     }
-    if (head.size > maxSize)
+    if (head.size > max(most, maxText))
     {
-        FatalErrorInFunction
-            << "the daemon on " << peer.c_str() << " announces a message of "
-            << double(head.size) << " bytes: not a message" << exit(FatalError);
+        return
+            name() + " announces " + std::to_string(head.size)
+          + " bytes where at most " + std::to_string(most) + " are expected";
     }
+    return string();
 }

@@ -186,7 +186,7 @@ void Foam::socketConnection::writeAll(const char* data, std::size_t size)
         {
             // what the daemon said before it closed names the cause
             message last;
-            read(last);
+            read(last, message::maxText);
             if (last.head.type == message::ERROR)
             {
                 fail("the daemon stopped: " + last.text());
@@ -238,12 +238,16 @@ void Foam::socketConnection::write(const message& m)
 }
 
 
-void Foam::socketConnection::read(message& m)
+void Foam::socketConnection::read(message& m, std::uint64_t most)
 {
     const auto end = deadline();
 
     readAll(reinterpret_cast<char*>(&m.head), sizeof(m.head), end);
-    m.check(peer_);
+    const string problem(m.problem(most));
+    if (!problem.empty())
+    {
+        fail(problem);
+    }
     m.payload.resize(m.head.size);
     readAll(m.payload.data(), m.payload.size(), end);
 }

@@ -1,0 +1,35 @@
+"""Locks on a case, which end with the processes that hold them."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from .dictionary import CaseError
+
+RUN, DAEMON = "run", "daemon"
+
+
+@contextmanager
+def locked(case: Path, who: str) -> Iterator[int]:
+    """The only run or daemon of a case. Yields the lock's descriptor: a child process that gets it keeps the
+    case locked although this process dies. CaseError where another process has the lock."""
+    try:
+        file = (case / f".gbm.{who}.lock").open("a+")
+    except OSError as error:
+        raise CaseError(f"cannot write in {case}: {error.strerror}") from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.seek(0)
+            raise CaseError(
+                f"another {who} is under way in {case} (process {file.read().strip()}, or one that it started)"
+            ) from None
+        file.truncate(0)
+        file.write(f"{os.getpid()}\n")
+        file.flush()
+        yield file.fileno()
