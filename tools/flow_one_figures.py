@@ -34,15 +34,15 @@ ROWS = {  # quantity: name in the series, the paper's Table 1
     "flatness of ∂u/∂x": ("velocity_flatness", ""),
 }
 
-FLOW_ONE = """Preset `flow_I`: ν = 0.001, box 2π, Eswaran–Pope force with variance {force.variance:g}, time scale
-{force.time_scale:g}, cutoff {force.cutoff:.4f}, seed {force.seed}. Means ± standard error (correlated samples);
-times averaged are counted in integral times of ε.
+FLOW_ONE = """Preset `flow_I`: ν = 0.001, box 2π, Eswaran–Pope force with variance {force.variance:g},
+time scale {force.time_scale:g}, cutoff {force.cutoff:.4f}, seed {force.seed}. Means ± standard error
+(correlated samples); times averaged are counted in integral times of ε.
 
-Tuned at 64³, where ε, set by the large scales, is right, but k_max η is too small for the gradients' skewness and
-flatness. 128³ continues the 64³ run. Matched are ν, ε, η and Re_λ. The printed λ = 0.23 contradicts them:
-λ = 15^(1/4) Re_λ^(1/2) η = 0.40. The printed L = 0.7 is not matched: a force on larger wavenumbers would lower L, and
-u' and Re_λ with it. (E–P's own example, cutoff 2√2 and variance 9.83e-7, gives at 64³
-ε = 0.00153 ± 0.00002, Re_λ = 60.8 ± 0.4, L = 1.09 ± 0.01.)"""
+Tuned at 64³, where ε, set by the large scales, is right, but k_max η is too small for the gradients'
+skewness and flatness. 128³ continues the 64³ run, with a time step of 0.01 and then 0.0125. Matched are ν, ε,
+η and Re_λ. The printed λ = 0.23 contradicts them: λ = 15^(1/4) Re_λ^(1/2) η = 0.40. The printed L = 0.7 is
+not matched: a force on larger wavenumbers would lower L, and u' and Re_λ with it. (E–P's own example, cutoff
+2√2 and variance 9.83e-7, gives at 64³ ε = 0.00153 ± 0.00002, Re_λ = 60.8 ± 0.4, L = 1.09 ± 0.01.)"""
 
 LINEAR = """f = A(u − <u>) with A = P/2k, P = 0.1, ν = 0.012. Literature: u'³/ε = 0.19 box (Rosales & Meneveau
 2005). Ratio of the means over the whole interval; its relative error is that of the mean of u'³/ε."""
@@ -58,10 +58,7 @@ def flow_one(folder: Path) -> None:
     found = runs(folder, "spectral_flow_I")
     means = {n: {q: s.mean(name, SETTLE[n]) for q, (name, _) in ROWS.items()} for n, s in found.items()}
     lines = ["# Flow I with the spectral solver", ""]
-    lines += [
-        "Means ± standard error (correlated samples); the interval is counted in integral times of ε.",
-        "",
-    ]
+    lines += [FLOW_ONE.format(force=PRESETS["flow_I"].forcing()), ""]
     lines += ["| | paper, Table 1 | " + " | ".join(f"{n}³" for n in found) + " |"]
     lines += ["|---|---|" + "---|" * len(found)]
     for q, (_, paper) in ROWS.items():
