@@ -129,7 +129,7 @@ class SpectralSolver:
         return (
             turbulence.scales(*self.spectrum(), self._dissipation(), self.viscosity)
             | turbulence.gradient_moments(operators.host(operators.to_physical(slopes)))
-            | {"power": self.forcing.power(u, self._energy)}
+            | {"power": self.forcing.input(u, self._energy)}
         )
 
     def energy_budget(self) -> dict[str, float]:
@@ -138,7 +138,7 @@ class SpectralSolver:
         self._evaluate(self._u, slope, self._energy)
         a, b = self.operators.host(self._u).astype(complex), self.operators.host(slope)
         gain = float(((a * b.conj()).real * self.modes.weights).sum())
-        power, dissipation = self.forcing.power(self._u, self._energy), self._dissipation()
+        power, dissipation = self.forcing.input(self._u, self._energy), self._dissipation()
         transfer, rate = gain - power, gain - dissipation
         return {"power": power, "dissipation": dissipation, "transfer": transfer, "rate": rate}
 
@@ -196,7 +196,7 @@ class SpectralSolver:
 
     def _evaluate(self, u: Array, out: Array, energy: float) -> None:
         """du/dt without viscosity."""
-        linear = self.forcing.coefficient(energy)
+        linear = self.forcing.rate(energy)
         self.operators.nonlinear(u, out, linear, want_speed=self.cfl is not None)
         self.forcing.add(out)
 
