@@ -14,10 +14,11 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
+from gbm_plugin.spectral.presets import PRESETS
 from gbm_plugin.statistics.series import TimeSeries
 
-VISCOSITY = 1e-3  # Flow I
 SETTLE = {64: 150.0, 128: 20.0}  # 64^3 starts from rest, 128^3 from the end of the 64^3 run
 SETTLE_LINEAR = 25.0
 ROWS = {  # quantity: name in the series, the paper's Table 1
@@ -33,6 +34,19 @@ ROWS = {  # quantity: name in the series, the paper's Table 1
     "flatness of ∂u/∂x": ("velocity_flatness", ""),
 }
 
+FLOW_ONE = """Preset `flow_I`: ν = 0.001, box 2π, Eswaran–Pope force with variance {force.variance:g},
+time scale {force.time_scale:g}, cutoff {force.cutoff:.4f}, seed {force.seed}. Means ± standard error
+(correlated samples); times averaged are counted in integral times of ε.
+
+Tuned at 64³, where ε, set by the large scales, is right, but k_max η is too small for the gradients'
+skewness and flatness. 128³ continues the 64³ run, with a time step of 0.01 and then 0.0125. Matched are ν, ε,
+η and Re_λ. The printed λ = 0.23 contradicts them: λ = 15^(1/4) Re_λ^(1/2) η = 0.40. The printed L = 0.7 is
+not matched: a force on larger wavenumbers would lower L, and u' and Re_λ with it. (E–P's own example, cutoff
+2√2 and variance 9.83e-7, gives at 64³ ε = 0.00153 ± 0.00002, Re_λ = 60.8 ± 0.4, L = 1.09 ± 0.01.)"""
+
+LINEAR = """f = A(u − <u>) with A = P/2k, P = 0.1, ν = 0.012. Literature: u'³/ε = 0.19 box (Rosales & Meneveau
+2005). Ratio of the means over the whole interval; its relative error is that of the mean of u'³/ε."""
+
 
 def runs(folder: Path, stem: str) -> dict[int, TimeSeries]:
     """Series by resolution."""
@@ -44,10 +58,7 @@ def flow_one(folder: Path) -> None:
     found = runs(folder, "spectral_flow_I")
     means = {n: {q: s.mean(name, SETTLE[n]) for q, (name, _) in ROWS.items()} for n, s in found.items()}
     lines = ["# Flow I with the spectral solver", ""]
-    lines += [
-        "Means ± standard error (correlated samples); the interval is counted in integral times of ε.",
-        "",
-    ]
+    lines += [FLOW_ONE.format(force=PRESETS["flow_I"].forcing()), ""]
     lines += ["| | paper, Table 1 | " + " | ".join(f"{n}³" for n in found) + " |"]
     lines += ["|---|---|" + "---|" * len(found)]
     for q, (_, paper) in ROWS.items():
@@ -59,6 +70,7 @@ def flow_one(folder: Path) -> None:
     lines.append("| time averaged | | " + " | ".join(a + b for a, b in zip(spans, times, strict=True)) + " |")
     resolved = [(n - 1) // 3 * means[n]["η"].value for n in found]
     lines.append("| k_max η | | " + " | ".join(f"{r:.2f}" for r in resolved) + " |")
+    lines += ["", "![dissipation in time and compensated spectra](spectral_flow_I.png)"]
     (folder / "spectral_flow_I.md").write_text("\n".join(lines) + "\n")
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
@@ -71,7 +83,8 @@ def flow_one(folder: Path) -> None:
     left.axhline(0.0015, color="k", lw=0.8, ls=":")
     left.set(xlabel="t", ylabel="ε", ylim=(0, None))
     right.axhline(1.6, color="k", lw=0.8, ls=":")
-    right.set(xlabel="kη", ylabel="E(k) k^{5/3} ε^{-2/3}", ylim=(1e-2, 5))
+    right.set(xlabel="kη", ylabel=r"$E(k)\, k^{5/3} \varepsilon^{-2/3}$", ylim=(1e-2, 5))
+    right.xaxis.set_minor_formatter(NullFormatter())
     for axis in (left, right):
         axis.legend()
     figure.savefig(folder / "spectral_flow_I.png", dpi=130)
@@ -80,6 +93,7 @@ def flow_one(folder: Path) -> None:
 def linear(folder: Path) -> None:
     found = runs(folder, "spectral_linear")
     lines = ["# Stationary linear forcing (constant power) with the spectral solver", ""]
+    lines += [LINEAR, ""]
     head = ["cells", "Re_λ", "u'³/ε / box (≈ 0.19)", "ε", "power", "turnovers k/ε", "turnovers L/u'"]
     lines += [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -100,6 +114,7 @@ def linear(folder: Path) -> None:
     axis.set(xlabel="t", ylabel="u'³/(ε box)", ylim=(0, None))
     axis.legend()
     figure.savefig(folder / "spectral_linear.png", dpi=130)
+    lines += ["", "![u'^3/eps in time](spectral_linear.png)"]
     (folder / "spectral_linear.md").write_text("\n".join(lines) + "\n")
 
 

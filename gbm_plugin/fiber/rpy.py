@@ -51,24 +51,33 @@ def pair(x):
 
 
 @njit(forceinline=True)
+def _load_pair(pairs, i, j):
+    """A, B, q, C, D of beads i ≠ j, and the direction from j to i."""
+    high, low = max(i, j), min(i, j)
+    p = COEFFICIENTS * (high * (high - 1) // 2 + low)
+    sign = 1.0 if i > j else -1.0
+    n = sign * load(pairs, p + 5), sign * load(pairs, p + 6), sign * load(pairs, p + 7)
+    return load(pairs, p), load(pairs, p + 1), load(pairs, p + 2), load(pairs, p + 3), load(pairs, p + 4), n
+
+
+@njit(forceinline=True)
 def response(pairs, i, j, force, torque):
     """Velocity and spin of bead i from force and torque on bead j."""
     if i == j:
         return force, scale(0.75, torque)
-    high, low = max(i, j), min(i, j)
-    p = COEFFICIENTS * (high * (high - 1) // 2 + low)
-    a, b, q, c, d = (
-        load(pairs, p),
-        load(pairs, p + 1),
-        load(pairs, p + 2),
-        load(pairs, p + 3),
-        load(pairs, p + 4),
-    )
-    n = load(pairs, p + 5), load(pairs, p + 6), load(pairs, p + 7)
-    signed = q if i > j else -q
+    a, b, q, c, d, n = _load_pair(pairs, i, j)
     velocity = add_scaled(scale(a, force), b * dot(n, force), n)
     spin = add_scaled(scale(0.75 * c, torque), 0.75 * d * dot(n, torque), n)
-    return add_scaled(velocity, signed, cross(torque, n)), add_scaled(spin, signed, cross(force, n))
+    return add_scaled(velocity, q, cross(torque, n)), add_scaled(spin, q, cross(force, n))
+
+
+@njit(forceinline=True)
+def torque_response(pairs, i, j, torque):
+    """Velocity and spin of bead i from a torque on bead j."""
+    if i == j:
+        return zero3(), scale(0.75, torque)
+    _, _, q, c, d, n = _load_pair(pairs, i, j)
+    return scale(q, cross(torque, n)), add_scaled(scale(0.75 * c, torque), 0.75 * d * dot(n, torque), n)
 
 
 def work_rows(beads: int, implicit: bool) -> int:
@@ -98,9 +107,25 @@ def _slip(state, v, s, i):
     return subtract(scale(-1.0, difference(v, i)), cross(load3(state, i), add(load3(s, i), load3(s, i + 1))))
 
 
+@njit(forceinline=True)
+def _dot_rows(a, first_a, stride, b, first_b, count):
+    """Σ a[first_a + k stride] b[first_b + k], in four sums so that they do not wait for each other."""
+    s0, s1, s2, s3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    fours = count - count % 4
+    for k in range(0, fours, 4):
+        at = first_a + k * stride
+        s0 = s0 + load(a, at) * load(b, first_b + k)
+        s1 = s1 + load(a, at + stride) * load(b, first_b + k + 1)
+        s2 = s2 + load(a, at + 2 * stride) * load(b, first_b + k + 2)
+        s3 = s3 + load(a, at + 3 * stride) * load(b, first_b + k + 3)
+    for k in range(fours, count):
+        s0 = s0 + load(a, first_a + k * stride) * load(b, first_b + k)
+    return (s0 + s1) + (s2 + s3)
+
+
 @njit
 def assemble(state, radius, pairs, factor, gaps, v, s):
-    """Cholesky factor (lower, in place) of the constraint matrix, and the response of gaps to multipliers.
+    """Cholesky factor (lower, its diagonal inverted) of the constraint matrix, and gaps from multipliers.
 
     Column 3k + c of gaps (3N, 3(N−1)) holds, for a unit multiplier of link k, all v_(i+1) − v_i and the mean v.
     """
@@ -147,17 +172,11 @@ def assemble(state, radius, pairs, factor, gaps, v, s):
             for d in range(3):
                 store(gaps, (n + d) * n + column, mean[d])
     for j in range(n):
-        total = load(factor, j * n + j)
-        for k in range(j):
-            total = total - load(factor, j * n + k) * load(factor, j * n + k)
-        diagonal = sqrt(total)
-        store(factor, j * n + j, diagonal)
-        inverse = 1.0 / diagonal
+        inverse = 1.0 / sqrt(load(factor, j * n + j) - _dot_rows(factor, j * n, 1, factor, j * n, j))
+        store(factor, j * n + j, inverse)
         for i in range(j + 1, n):
-            total = load(factor, i * n + j)
-            for k in range(j):
-                total = total - load(factor, i * n + k) * load(factor, j * n + k)
-            store(factor, i * n + j, total * inverse)
+            rest = load(factor, i * n + j) - _dot_rows(factor, i * n, 1, factor, j * n, j)
+            store(factor, i * n + j, rest * inverse)
 
 
 @njit
@@ -168,24 +187,45 @@ def roll(state, factor, gaps, v, s, multipliers, out):
     for i in range(links):
         store3(multipliers, i, scale(-1.0, _slip(state, v, s, i)))
     for i in range(n):
-        total = load(multipliers, i)
-        for k in range(i):
-            total = total - load(factor, i * n + k) * load(multipliers, k)
-        store(multipliers, i, total / load(factor, i * n + i))
+        rest = load(multipliers, i) - _dot_rows(factor, i * n, 1, multipliers, 0, i)
+        store(multipliers, i, rest * load(factor, i * n + i))
     for back in range(n):
         i = n - 1 - back
-        total = load(multipliers, i)
-        for k in range(i + 1, n):
-            total = total - load(factor, k * n + i) * load(multipliers, k)
-        store(multipliers, i, total / load(factor, i * n + i))
+        rest = load(multipliers, i) - _dot_rows(factor, (i + 1) * n + i, n, multipliers, i + 1, back)
+        store(multipliers, i, rest * load(factor, i * n + i))
     for i in range(links):
         store3(out, i, difference(v, i))
     store3(out, links, mean_vector(v, links + 1))
     for row in range(n + 3):
-        total = load(out, row)
-        for k in range(n):
-            total = total + load(gaps, row * n + k) * load(multipliers, k)
-        store(out, row, total)
+        store(out, row, load(out, row) + _dot_rows(gaps, row * n, 1, multipliers, 0, n))
+
+
+@njit(forceinline=True)
+def _dot_columns(a, first, stride, x, begin, count):
+    """Σ a[first + k stride] x[begin + k] for three columns at once, row by row in x."""
+    even, odd = zero3(), zero3()
+    twos = count - count % 2
+    for k in range(0, twos, 2):
+        at = first + k * stride
+        even = add_scaled(even, load(a, at), load3(x, begin + k))
+        odd = add_scaled(odd, load(a, at + stride), load3(x, begin + k + 1))
+    if count > twos:
+        even = add_scaled(even, load(a, first + twos * stride), load3(x, begin + twos))
+    return add(even, odd)
+
+
+@njit
+def _roll_columns(factor, gaps, n, x, out):
+    """As roll for three columns at once: x, their slips, is overwritten; out, their gaps, is completed."""
+    for i in range(n):
+        rest = subtract(load3(x, i), _dot_columns(factor, i * n, 1, x, 0, i))
+        store3(x, i, scale(load(factor, i * n + i), rest))
+    for back in range(n):
+        i = n - 1 - back
+        rest = subtract(load3(x, i), _dot_columns(factor, (i + 1) * n + i, n, x, i + 1, back))
+        store3(x, i, scale(load(factor, i * n + i), rest))
+    for row in range(n + 3):
+        store3(out, row, subtract(load3(out, row), _dot_columns(gaps, row * n, 1, x, 0, n)))
 
 
 @njit
@@ -195,7 +235,7 @@ def torques_to_motion(pairs, torques, v, s):
     for i in range(beads):
         velocity, spin = load3(v, i), load3(s, i)
         for j in range(beads):
-            dv, ds = response(pairs, i, j, zero3(), load3(torques, j))
+            dv, ds = torque_response(pairs, i, j, load3(torques, j))
             velocity, spin = add(velocity, dv), add(spin, ds)
         store3(v, i, velocity)
         store3(s, i, spin)
@@ -266,7 +306,9 @@ def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, 
     at = (n + 3 + m) * m
     moments = rest[at : at + m]
     at += m
-    free, g, gap = rest[at : at + n + 3], rest[at + n + 3 : at + 2 * n + 6], other[: n + 3]
+    free, g, gap_column = rest[at : at + n + 3], rest[at + n + 3 : at + 2 * n + 6], other[: n + 3]
+    at += 2 * n + 6
+    slips, columns = rest[at : at + 3 * n], rest[at + 3 * n : at + 6 * n + 9]
     assemble(state, radius, pairs, factor, gaps, v, s)
     one, none = splat(1.0), splat(0.0)
     for j in range(1, links):
@@ -274,16 +316,27 @@ def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, 
             unit = (one if c == 0 else none, one if c == 1 else none, one if c == 2 else none)
             ahead, behind = scale(4.0 / 3.0, unit), scale(-4.0 / 3.0, unit)
             for i in range(links + 1):
-                v1, s1 = response(pairs, i, j - 1, zero3(), ahead)
-                v2, s2 = response(pairs, i, j + 1, zero3(), behind)
+                v1, s1 = torque_response(pairs, i, j - 1, ahead)
+                v2, s2 = torque_response(pairs, i, j + 1, behind)
                 store3(v, i, add(v1, v2))
                 store3(s, i, add(s1, s2))
-            roll(state, factor, gaps, v, s, multipliers, gap)
+            for i in range(links):
+                slip, gap = _slip(state, v, s, i), difference(v, i)
+                for d in range(3):
+                    store(slips, 3 * (3 * i + d) + c, slip[d])
+                    store(columns, 3 * (3 * i + d) + c, gap[d])
+            mean = mean_vector(v, links + 1)
+            for d in range(3):
+                store(columns, 3 * (n + d) + c, mean[d])
+        _roll_columns(factor, gaps, n, slips, columns)
+        for c in range(3):
             column = 3 * (j - 1) + c
             for row in range(n + 3):
-                store(bending, row * m + column, load(gap, row))
+                value = load(columns, 3 * row + c)
+                store(gap_column, row, value)
+                store(bending, row * m + column, value)
             for i in range(1, links):
-                _, change = _moment_change(state, gap, i, law)
+                _, change = _moment_change(state, gap_column, i, law)
                 for d in range(3):
                     row = 3 * (i - 1) + d
                     store(matrix, row * m + column, (one if row == column else none) - beta * sigma * change[d])
@@ -304,14 +357,9 @@ def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, 
             store(moments, i, load(moments, i) - ratio * load(moments, k))
     for back in range(m):
         i = m - 1 - back
-        total = load(moments, i)
-        for j in range(i + 1, m):
-            total = total - load(matrix, i * m + j) * load(moments, j)
-        store(moments, i, total / load(matrix, i * m + i))
+        rest = load(moments, i) - _dot_rows(matrix, i * m + i + 1, 1, moments, i + 1, back)
+        store(moments, i, rest / load(matrix, i * m + i))
     for row in range(n + 3):
-        total = load(free, row)
-        for k in range(m):
-            total = total + load(bending, row * m + k) * load(moments, k)
-        store(rates, row, total)
+        store(rates, row, load(free, row) + _dot_rows(bending, row * m, 1, moments, 0, m))
     for i in range(links):
         store3(rates, i, scale(0.5 / radius, cross(load3(state, i), load3(rates, i))))

@@ -8,6 +8,7 @@ remain) and P_ij = delta_ij - k_i k_j/k^2,
 `Arrays` serves a GPU, and checks the slab-wise CPU operators that inherit from it (`slabs.py`).
 """
 
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
@@ -37,9 +38,15 @@ class Arrays:
         """Modes of a fluid at rest."""
         return self.xp.zeros((3, *self.modes.shape), self.complex)
 
-    def wavenumbers(self) -> list[Array]:
+    @cached_property
+    def k(self) -> list[Array]:
         """kx, ky, kz in the working precision, shaped to broadcast."""
         return [self.xp.asarray(k, self.real) for k in self.modes.k]
+
+    @cached_property
+    def k_squared(self) -> Array:
+        """|k|^2 in double precision."""
+        return self.xp.asarray(self.modes.k_squared)
 
     def to_modes(self, fields: Array) -> Array:
         """Truncated Fourier coefficients (m, 2K+1, 2K+1, K+1) of real fields (m, n, n, n)."""
@@ -63,7 +70,7 @@ class Arrays:
 
     def project(self, f: Array) -> Array:
         """The solenoidal part of f without its mean: P f."""
-        kx, ky, kz = self.wavenumbers()
+        kx, ky, kz = self.k
         k_squared = kx**2 + ky**2 + kz**2
         k_squared[0, 0, 0] = 1
         q = (kx * f[0] + ky * f[1] + kz * f[2]) / k_squared
@@ -76,7 +83,7 @@ class Arrays:
         x, y, z = self.to_physical(u)
         if want_speed:
             self.max_speed = float((abs(x) + abs(y) + abs(z)).max())
-        kx, ky, kz = self.wavenumbers()
+        kx, ky, kz = self.k
         xx, yy, xy, xz, yz = self.to_modes([x * x - z * z, y * y - z * z, x * y, x * z, y * z])
         divergence = self.xp.stack(
             [kx * xx + ky * xy + kz * xz, kx * xy + ky * yy + kz * yz, kx * xz + ky * yz]
@@ -85,9 +92,8 @@ class Arrays:
 
     def combine(self, out: Array, terms: list[Term]) -> float:
         """out = sum of coefficient exp(-nu k^2 delay) modes over terms; returns its fluctuation energy."""
-        k_squared = self.xp.asarray(self.modes.k_squared)
         total = sum(
-            (c * self.xp.exp(-self.viscosity * k_squared * t)).astype(self.real) * a for c, t, a in terms
+            (c * self.xp.exp(-self.viscosity * self.k_squared * t)).astype(self.real) * a for c, t, a in terms
         )
         out[:] = total
         return self.energy(out)
@@ -112,11 +118,11 @@ class Arrays:
 
     def derivative(self, u: Array, axis: int) -> Array:
         """Modes of du/dx_axis."""
-        return 1j * self.wavenumbers()[axis] * u
+        return 1j * self.k[axis] * u
 
     def curl(self, u: Array) -> Array:
         """Modes of the curl of u."""
-        kx, ky, kz = self.wavenumbers()
+        kx, ky, kz = self.k
         return 1j * self.xp.stack([ky * u[2] - kz * u[1], kz * u[0] - kx * u[2], kx * u[1] - ky * u[0]])
 
     def host(self, a: Array) -> NDArray:

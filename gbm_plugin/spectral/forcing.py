@@ -1,6 +1,6 @@
 """Forces that sustain turbulence, built from the same values as their `constant/fvOptions` entries.
 
-A force enters the momentum equation as `coefficient(energy) * (u - <u>)` plus a field of few modes, added by
+A force enters the momentum equation as `rate(energy) * (u - <u>)` plus a field of few modes, added by
 `add(rhs)`; it moves on with `advance(time_step)` after every step of the flow.
 """
 
@@ -18,7 +18,7 @@ class Forcing:
     def bind(self, operators: Arrays) -> None:
         """Take the mode set and the array library of the solver that this force will drive."""
 
-    def coefficient(self, energy: float) -> float:
+    def rate(self, energy: float) -> float:
         """A in f = A (u - <u>), from the kinetic energy of the fluctuations."""
         return 0.0
 
@@ -28,9 +28,9 @@ class Forcing:
     def advance(self, time_step: float) -> None:
         """Move the force to the next step."""
 
-    def power(self, u: Array, energy: float) -> float:
+    def input(self, u: Array, energy: float) -> float:
         """<u.f>, from the modes of u and the kinetic energy of its fluctuations."""
-        return 2 * self.coefficient(energy) * energy if energy > 0 else 0.0
+        return 2 * self.rate(energy) * energy if energy > 0 else 0.0
 
     def state(self) -> dict[str, Value]:
         """All that a bitwise restart needs."""
@@ -54,16 +54,16 @@ class LinearForcing(Forcing):
         if not 0 < given < np.inf:
             name = "coefficient" if power is None else "power"
             raise ValueError(f"{name} of LinearForcing must be positive, got {given}")
-        self._coefficient, self._power = coefficient, power
+        self.coefficient, self.power = coefficient, power
 
-    def coefficient(self, energy: float) -> float:
-        if self._power is None:
-            return self._coefficient
+    def rate(self, energy: float) -> float:
+        if self.power is None:
+            return self.coefficient
         if not energy > 0:
             raise ValueError(
                 "LinearForcing with constant power needs a fluid that moves: set a velocity first"
             )
-        return self._power / (2 * energy)
+        return self.power / (2 * energy)
 
 
 class EswaranPope(Forcing):
@@ -125,7 +125,7 @@ class EswaranPope(Forcing):
         memory = np.exp(-time_step / self.time_scale)
         self._b = memory * self._b + np.sqrt(1 - memory**2) * self._noise()
 
-    def power(self, u: Array, energy: float) -> float:
+    def input(self, u: Array, energy: float) -> float:
         velocity = self._operators.host(u[(slice(None), *self._index)]).astype(complex)
         return float((self._weights * (velocity * self._stored().conj()).real).sum())
 

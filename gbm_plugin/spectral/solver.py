@@ -114,17 +114,14 @@ class SpectralSolver:
             self.step += 1
             self._discard_fields()
             if not np.isfinite(self._energy):
-                reason = (
-                    f"velocity is not finite after step {self.step}, t = {self.time:.6g}, time step {h:.3g}"
-                )
+                place = f"after step {self.step}, t = {self.time:.6g}, time step {h:.3g}"
                 raise FloatingPointError(
-                    f"{reason}: the step is too long for this flow, or the forcing too strong"
+                    f"velocity is not finite {place}: use a shorter step or a weaker force"
                 )
 
     def spectrum(self) -> tuple[NDArray, NDArray]:
         """k (S,) and E(k) (S,), eq. (16) of the paper; see `statistics.turbulence.energy_spectrum`."""
-        energy = self.operators.host(self.operators.mode_energy(self._u))
-        return turbulence.shell_spectrum(energy, self.modes.k, self.modes.k0)
+        return turbulence.shell_spectrum(self._mode_energy(), self.modes.k, self.modes.k0)
 
     def statistics(self) -> dict[str, float]:
         """Energies, scales and gradient moments at the present time, by `statistics.turbulence`.
@@ -138,7 +135,7 @@ class SpectralSolver:
         return (
             turbulence.scales(*self.spectrum(), self._dissipation(), self.viscosity)
             | turbulence.gradient_moments(operators.host(operators.to_physical(slopes)))
-            | {"power": self.forcing.power(u, self._energy)}
+            | {"power": self.forcing.input(u, self._energy)}
         )
 
     def energetics(self) -> dict[str, float]:
@@ -155,13 +152,9 @@ class SpectralSolver:
         self._evaluate(self._u, slope, self._energy)
         a, b = self.operators.host(self._u).astype(complex), self.operators.host(slope)
         gain = float(((a * b.conj()).real * self.modes.weights).sum())
-        power, dissipation = self.forcing.power(self._u, self._energy), self._dissipation()
-        return {
-            "power": power,
-            "dissipation": dissipation,
-            "transfer": gain - power,
-            "rate": gain - dissipation,
-        }
+        power, dissipation = self.forcing.input(self._u, self._energy), self._dissipation()
+        transfer, rate = gain - power, gain - dissipation
+        return {"power": power, "dissipation": dissipation, "transfer": transfer, "rate": rate}
 
     def sample(
         self, positions: ArrayLike, time: float, need: str = "gradient"
@@ -217,7 +210,7 @@ class SpectralSolver:
 
     def _evaluate(self, u: Array, out: Array, energy: float) -> None:
         """du/dt without viscosity."""
-        linear = self.forcing.coefficient(energy)
+        linear = self.forcing.rate(energy)
         self.operators.nonlinear(u, out, linear, want_speed=self.cfl is not None)
         self.forcing.add(out)
 
@@ -231,12 +224,14 @@ class SpectralSolver:
         return self.cfl * self.box / self.cells / speed
 
     def _dissipation(self) -> float:
-        energy = self.operators.host(self.operators.mode_energy(self._u))
-        return 2 * self.viscosity * float((self.modes.k_squared * energy).sum())
+        return 2 * self.viscosity * float((self.modes.k_squared * self._mode_energy()).sum())
+
+    def _mode_energy(self) -> NDArray:
+        return self.operators.host(self.operators.mode_energy(self._u))
 
     def _reach(self, time: float) -> None:
         """Advance by whole steps until `time`."""
-        slack = 1e-6 * (self.time_step or 0.0)
+        slack = 1e-4 * (self.time_step or 0.0)  # the rounding of many added steps
         while self.time < time - slack:
             self.advance()
         if abs(self.time - time) > max(slack, 1e-12 * abs(time)):

@@ -29,7 +29,8 @@ class Mean:
     duration: float
 
     def __str__(self) -> str:
-        return f"{self.value:.6g} +- {self.error:.2g}"
+        digits = 6 if self.error == 0 else max(0, 1 - int(np.floor(np.log10(self.error))))
+        return f"{self.value:.{digits}f} ± {self.error:.{digits}f}"
 
 
 def autocorrelation(series: ArrayLike) -> NDArray:

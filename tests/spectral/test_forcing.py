@@ -44,10 +44,10 @@ def test_beltrami_flow_under_linear_forcing(forcing, scheme, order):
     u = abc(12, waves=2)
     k0 = (u**2).sum(axis=0).mean() / 2
     r = 2 * nu * q**2
-    if forcing._power is None:
-        exact = k0 * np.exp((2 * forcing._coefficient - r) * end)
+    if forcing.power is None:
+        exact = k0 * np.exp((2 * forcing.coefficient - r) * end)
     else:
-        exact = forcing._power / r + (k0 - forcing._power / r) * np.exp(-r * end)
+        exact = forcing.power / r + (k0 - forcing.power / r) * np.exp(-r * end)
     errors = []
     for steps in (10, 20, 40):
         solver = SpectralSolver(12, nu, forcing=forcing, time_step=end / steps, scheme=scheme)

@@ -52,6 +52,19 @@ def test_constant_series_has_no_error():
     assert series.mean(np.full(50, 0.1)).error == pytest.approx(0.0, abs=1e-15)
 
 
+@pytest.mark.parametrize(
+    "value, error, text",
+    [
+        (0.00149487, 1.43e-5, "0.001495 ± 0.000014"),
+        (52.2041, 0.234, "52.20 ± 0.23"),
+        (1234.5, 33.3, "1234 ± 33"),
+        (2.0, 0.0, "2.000000 ± 0.000000"),
+    ],
+)
+def test_text_shows_two_digits_of_the_error(value, error, text):
+    assert str(series.Mean(value, error, 1.0, 10.0)) == text
+
+
 def test_refusals():
     with pytest.raises(ValueError, match="too short"):
         series.mean(np.linspace(0, 1, 100))
