@@ -142,7 +142,7 @@ class SpectralSolver:
         """kinetic_energy of the fluctuations, power and dissipation at the present time; costs no transform."""
         return {
             "kinetic_energy": self._energy,
-            "power": self.forcing.power(self._u, self._energy),
+            "power": self.forcing.input(self._u, self._energy),
             "dissipation": self._dissipation(),
         }
 
