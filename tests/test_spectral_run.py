@@ -69,7 +69,7 @@ def test_a_killed_run_continues_to_the_same_bits(whole, tmp_path):
     ).unlink()  # killed while it wrote: 0.2 is the latest complete time
     set_entry(path / "system/controlDict", "endTime", "0.4")
     done = run_case(path, *SPECTRAL)
-    assert "continuing from time 0.2" in done.stdout
+    assert "falling back to time 0.2" in done.stdout
     assert (path / "spectral/previous/1/0.3/U").is_file()
     for a, b in zip(results(path), results(whole), strict=True):
         if isinstance(a, dict):

@@ -10,6 +10,7 @@ import numpy as np
 from .dictionary import CaseError, Dictionary
 from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
 
+END = f"// {73 * '*'} //"  # the last line of what OpenFOAM writes: the file is whole
 KINDS = ("random", "modes", "taylorGreen", "ABC")
 
 
@@ -80,7 +81,7 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
     with target.open("wb") as file:
         file.write(f"{head}internalField   nonuniform List<vector> \n{len(cells)}\n(".encode())
         file.write(np.ascontiguousarray(cells, dtype="<f8").tobytes())
-        file.write(f")\n;{tail}".encode())
+        file.write(f")\n;{tail.rstrip()}\n\n{END}\n".encode())
 
 
 def _split_internal_field(text: str, path: Path) -> tuple[str, str, str]:
