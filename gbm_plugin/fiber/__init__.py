@@ -1,7 +1,8 @@
 """The Gears Bead Model: fibers of touching beads that bend, do not stretch, and roll on each other."""
 
 from .fibers import Fibers
+from .rates import instant_rates
 from .simulate import Trajectory, simulate
 from .stepper import Stepper
 
-__all__ = ["Fibers", "Stepper", "Trajectory", "simulate"]
+__all__ = ["Fibers", "Stepper", "Trajectory", "instant_rates", "simulate"]

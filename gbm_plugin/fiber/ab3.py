@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 from .ambient import SAMPLES
+from .bending import TORQUES
 from .layout import rotated
 from .mobility import link_rates, work_rows
 from .simd import (
@@ -28,7 +29,9 @@ from .simd import (
 )
 
 STAGES = 2  # times per step at which the flow is wanted: its start, and its middle (by a starting step)
-TENSION_LIMIT = 0.38  # (6/11 − 0.206)/0.87: what bending at eq. (10) leaves of the stability limit
+LIMIT = 6 / 11  # of AB3 on the negative real axis
+BENDING_RATE = 0.252  # fastest bending mode over K/μd⁴, of long chains: 0.206 in free drain, 0.252 with rpy
+TENSION_RATE = 1.2  # fastest transverse relaxation of a taut chain over tension/(6πμa 2a): 0.87 in free drain
 
 
 def scratch_rows(mobility: int, beads: int) -> int:
@@ -39,13 +42,13 @@ def scratch_rows(mobility: int, beads: int) -> int:
 def stable_step(fibers, softness: float, tension: float) -> float:
     """Largest stable step: eq. (10), times softness, cos²(θ/2) of the sharpest joint of a discrete rod.
 
-    A chain under tension T relaxes transversely at up to 0.87 T/(6πμa 2a), which for long chains in strong
-    extension can exceed the rate of bending; tension: T/6πμa.
+    tension: T/6πμa. It matters for long chains in strong extension, where it outruns bending.
     """
     diameter = 2 * fibers.radius
-    stiffest = fibers.bending_stiffness.max()
-    bending = fibers.viscosity * diameter**4 / stiffest * softness if stiffest > 0 else np.inf
-    return min(bending, TENSION_LIMIT * diameter / tension if tension > 0 else np.inf)
+    stiffness = fibers.bending_stiffness.max() / (fibers.viscosity * diameter**4 * softness)
+    factor = TORQUES[fibers.bending_torque] / TORQUES["consistent"]
+    rate = BENDING_RATE * factor * stiffness + TENSION_RATE * tension / diameter
+    return min(1 / stiffness if stiffness > 0 else np.inf, LIMIT / rate if rate > 0 else np.inf)
 
 
 def plan(ages: list[float], step: float, count: int) -> np.ndarray:

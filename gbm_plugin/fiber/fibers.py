@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .bending import CURVATURE_LAWS, TORQUES, bending_energy
+from .contact import self_contacts
 
 TOUCHING = 1e-6  # largest relative difference of a bead spacing from 2a
 
@@ -153,3 +154,8 @@ class Fibers:
     def bending_energy(self) -> np.ndarray:
         """(F,) energy whose derivative the consistent torque is, of the curvature law in use."""
         return bending_energy(self.links, self.bending_stiffness, self.radius, self.curvature_law)
+
+    @property
+    def self_contacts(self) -> np.ndarray:
+        """(F,) number of overlapping pairs of beads that are not neighbours."""
+        return self_contacts(self.positions, 2 * self.radius)

@@ -8,6 +8,7 @@ from numba import get_num_threads
 from . import ab3, implicit
 from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
+from .contact import repulsion_velocity
 from .fibers import Fibers, one_of, positive
 from .layout import bead_positions, pack
 from .mobility import MOBILITIES
@@ -15,7 +16,8 @@ from .simd import LANES
 from .strain import with_strain
 
 INTEGRATORS = ("ab3", "implicit", "auto")
-TOLERANCE = 1e-4  # error estimate per accepted step: bead displacement over fiber length
+TOLERANCE = 1e-3  # bead displacement over fiber length, and
+SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
 SMALLEST_STEP = 1e-12  # of a flow step, by implicit
 
@@ -24,9 +26,10 @@ class Stepper:
     """Time stepping of one family, fed with one sample of the flow at the beads per step.
 
     integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto" (ab3
-    where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber). tolerance: largest
-    error estimate of one accepted step of one fiber, as rms link rotation in rad, that is bead displacement over
-    fiber length (for implicit and auto; None: 1e-4).
+    where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber). tolerance (for
+    implicit and auto; None: 1e-3): bead displacement over fiber length; every accepted step of every fiber is held
+    to a tenth of it, in the rms rotation of its links, so that a relaxation of several steps stays within. repulsion: rate (1/time) at which overlaps of beads that are
+    not neighbours decay; below about 1/time_step.
 
     need says what observe() takes beside the velocity. The loop of a run:
 
@@ -44,6 +47,7 @@ class Stepper:
         mobility="freeDrain",
         strain_coupling=False,
         tolerance=None,
+        repulsion=0.0,
     ):
         self.fibers = fibers
         self.integrator = one_of("integrator", integrator, INTEGRATORS)
@@ -53,6 +57,8 @@ class Stepper:
             raise ValueError("strain_coupling with mobility freeDrain has no effect; it needs rpy")
         self.need = "gradient" if strain_coupling else "rotation"
         self.tolerance = positive("tolerance", TOLERANCE if tolerance is None else tolerance)
+        self.local_tolerance = SHARE * self.tolerance
+        self.repulsion = positive("repulsion", repulsion, zero=True)
         self.time = float(time)
         self.provisional = False
         self._ambient = Ambient(fibers.count, fibers.beads)
@@ -103,11 +109,13 @@ class Stepper:
         """
         if time != self.time:
             raise ValueError(f"sample is of time {time:g}; the fibers are at time {self.time:g}")
-        velocity, extra = self._field("velocity", velocity, (3,)), self._field(
-            self.need, extra, (3, 3) if self.need == "gradient" else (3,)
-        )
+        tail = (3, 3) if self.need == "gradient" else (3,)
+        velocity, extra = self._field("velocity", velocity, (3,)), self._field(self.need, extra, tail)
         if self.need == "gradient":
             velocity, extra = with_strain(self.positions, velocity, extra, self.fibers.radius)
+        if self.repulsion:
+            push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
+            velocity = velocity + push
         self._ambient.observe(time, velocity, extra)
 
     def _field(self, name, values, tail) -> np.ndarray:
@@ -169,7 +177,7 @@ class Stepper:
         everyone = np.arange(self.fibers.count)
         if count == 1:
             error = self._explicit(1)
-            self._implicit(everyone[~(error <= self.tolerance)])
+            self._implicit(everyone[~(error <= self.local_tolerance)])
         else:
             self._ages = []
             self._implicit(everyone)
@@ -220,11 +228,11 @@ class Stepper:
             trial[members] = remaining / np.ceil(np.maximum(remaining / self._step[members] * (1 - 1e-12), 1))
             implicit.attempt(
                 self._mobility, members, source, lagged, velocity, rotation, times, self._beta, fibers.radius, self._law,
-                self.tolerance, self._scratch, trial, self._state, self._multipliers, elapsed, self._step, error,
+                self.local_tolerance, self._scratch, trial, self._state, self._multipliers, elapsed, self._step, error,
             )  # fmt: skip
             source, lagged = self._state, self._multipliers
             attempts += 1
-            self._count(0, error[members][error[members] <= self.tolerance])
+            self._count(0, error[members][error[members] <= self.local_tolerance])
             if (trial[members] < SMALLEST_STEP * end).any():
                 self._finite(np.where(trial[members] < SMALLEST_STEP * end, np.nan, 0.0), members)
             members = members[elapsed[members] < end * (1 - 1e-12)]

@@ -39,8 +39,9 @@ Foam::periodicLaplacian::periodicLaplacian(const fvMesh& mesh)
     forAll(directions_, facei)
     {
         const vector area(cmptMag(mesh.faceAreas()[facei]));
-        const scalar largest = cmptMax(area);
-        directions_[facei] = (area.x() == largest ? 0 : area.y() == largest ? 1 : 2);
+        directions_[facei] =
+            (area.x() > 0.5*mag(area) ? vector::X
+          : area.y() > 0.5*mag(area) ? vector::Y : vector::Z);
         nFaces_[directions_[facei]] += 1;
     }
     reduce(nFaces_, sumOp<vector>());
@@ -175,11 +176,12 @@ Foam::vector Foam::periodicLaplacian::meanCoefficients
     const lduInterfaceFieldPtrsList& interfaces
 ) const
 {
+    const scalarField& upper = matrix.upper();
     vector sums(Zero);
 
-    forAll(matrix.upper(), facei)
+    forAll(upper, facei)
     {
-        sums[directions_[facei]] += matrix.upper()[facei];
+        sums[directions_[facei]] += upper[facei];
     }
     forAll(interfaces, patchi)
     {

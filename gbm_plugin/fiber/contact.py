@@ -1,0 +1,46 @@
+"""Beads of one fiber that meet without being neighbours: counted, and pushed apart if asked to."""
+
+import numpy as np
+from numba import njit, prange
+
+
+@njit(parallel=True, cache=True)
+def _count(positions, diameter, counts):
+    for f in prange(positions.shape[0]):
+        for i in range(positions.shape[1]):
+            for j in range(i + 2, positions.shape[1]):
+                x = positions[f, i] - positions[f, j]
+                if x[0] ** 2 + x[1] ** 2 + x[2] ** 2 < diameter**2:
+                    counts[f] += 1
+
+
+@njit(parallel=True, cache=True)
+def _push(positions, diameter, rate, velocity):
+    for f in prange(positions.shape[0]):
+        for i in range(positions.shape[1]):
+            for j in range(i + 2, positions.shape[1]):
+                x = positions[f, i] - positions[f, j]
+                r = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
+                if 0 < r < diameter:
+                    push = 0.5 * rate * (diameter / r - 1)
+                    for c in range(3):
+                        velocity[f, i, c] += push * x[c]
+                        velocity[f, j, c] -= push * x[c]
+
+
+def self_contacts(positions: np.ndarray, diameter: float) -> np.ndarray:
+    """(F,) number of pairs of beads that overlap and are not neighbours; positions (F, N, 3)."""
+    counts = np.zeros(len(positions), dtype=np.int64)
+    _count(np.ascontiguousarray(positions), diameter, counts)
+    return counts
+
+
+def repulsion_velocity(positions: np.ndarray, diameter: float, rate: float) -> np.ndarray:
+    """(F, N, 3) velocities that part overlapping pairs: their overlap decays at the given rate (1/time).
+
+    The force behind it is linear in the overlap and of zero range beyond contact; it acts through each bead's own
+    drag, is evaluated with the flow sample, and needs rate × flow step below about 1.
+    """
+    velocity = np.zeros(positions.shape)
+    _push(np.ascontiguousarray(positions), diameter, rate, velocity)
+    return velocity
