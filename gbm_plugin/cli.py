@@ -81,6 +81,12 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("info", _info, "Say what a case contains and whether the fiber model holds in it. SI units.")
     add_case(sub)
     _add_json(sub)
+    sub = add("validate", _validate, "Converge OpenFOAM with a case's schemes to the spectral solver.")
+    add_case(sub)
+    sub.add_argument("--cells", type=int, nargs="+", default=[24, 32, 48, 64], help="(default: 24 32 48 64)")
+    sub.add_argument("--time-step", type=float, default=0.04, help="of the first, in proportion for the others [s]")
+    _add_json(sub)
+
     sub = add("bench", None, "Measure speed beside error; ratios within one run.")
     kinds = sub.add_subparsers(dest="kind", required=True, metavar="KIND")
 
@@ -137,6 +143,14 @@ def _info(arguments) -> dict:
 
     result = figures(read_scene(arguments.case))
     print(describe(result))
+    return result
+
+
+def _validate(arguments) -> dict:
+    from .validate import table, validate
+
+    result = validate(arguments.case, arguments.cells, arguments.time_step)
+    print(table(result))
     return result
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from ..case.openfoam import utility
+from ..case.copies import copy_case
 from ..output.dat import read_dat
 from ..run import run as run_case
 
-FIBERS = """FoamFile {{ version 2.0; format ascii; class dictionary; object fiberProperties; }}
-coupling {{ transport {transport}; }}
+FIBERS = """coupling {{ transport {transport}; }}
 recordInterval {never};
 families {{ bench {{ count {fibers}; beads {beads}; length {length}; bendingStiffness 1e-5; seed 1; }} }}
 """
@@ -34,21 +32,13 @@ def run(
     case = Path(case)
     with tempfile.TemporaryDirectory(prefix="gbm-bench-") as folder:
         copy = Path(folder) / "case"
-        copy.mkdir()
-        for part in ("0.orig", "constant", "system"):
-            shutil.copytree(case / part, copy / part, ignore=shutil.ignore_patterns("polyMesh"))
-        changes = {
+        entries = {
             "system/controlDict": {"deltaT": 0.005, "endTime": 0.005 * steps, "writeInterval": 10 * steps},
             "system/blockMeshDict": {"n": cells},
         }
-        for name, entries in changes.items():
-            for entry, value in entries.items():
-                words = ("-disableFunctionEntries", "-entry", entry, "-set", str(value))
-                utility(copy, "foamDictionary", str(copy / name), *words)
-        text = FIBERS.format(
-            transport=transport, fibers=fibers, beads=beads, length=0.1 * beads, never=10 * steps
-        )
-        (copy / "constant/fiberProperties").write_text(text)
+        sizes = {"fibers": fibers, "beads": beads, "length": 0.1 * beads, "never": 10 * steps}
+        words = FIBERS.format(transport=transport, **sizes)
+        copy_case(case, copy, entries, {"constant/fiberProperties": words})
         run_case(copy)
         table = read_dat(copy / "postProcessing/fibers", "coupling.dat")
     late = slice(5, None)  # the first steps are corrected, and compile
