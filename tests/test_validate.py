@@ -1,0 +1,15 @@
+"""The coupling as a whole: OpenFOAM, the plugin, the daemon and the fibers against the spectral solver."""
+
+from __future__ import annotations
+
+from conftest import DEFAULT_CASE
+from gbm_plugin.validate import table, validate
+
+
+def test_flow_and_fibers_converge_at_second_order():
+    """Finite volumes, trilinear sampling and a step in proportion to the cells: all second order. The reference
+    resolves the initial modes, samples them exactly and shares none of the code of the flow."""
+    result = validate(DEFAULT_CASE, [16, 24], 0.06)
+    for name, order in result["orders"][0].items():
+        assert 1.6 < order < 2.4, f"{name}\n{table(result)}"
+    assert result["rows"][1]["velocity_error"] < 0.1
