@@ -94,6 +94,30 @@ def test_a_signal_stops_it_cleanly(tmp_path):
     assert len(saved) == 1
 
 
+ESWARAN_POPE = "eswaranPope { type eswaranPope; variance 5e-3; timeScale 0.5; cutoff 2.8284; seed 4; }"
+
+
+def test_the_papers_forcing_is_the_spectral_solvers(tmp_path):
+    """The same entry drives one engine, from its seed to the same bits, and is refused by the other."""
+    runs = []
+    for name in ("one", "two"):
+        path = make_case(tmp_path / name, steps=5, prepared=False, fv_options=ESWARAN_POPE)
+        run_case(path, *SPECTRAL)
+        runs.append(results(path)[0])
+    np.testing.assert_array_equal(runs[0]["k"], runs[1]["k"])
+    assert np.abs(runs[0]["power"]).max() > 0
+    done = gbm("run", path)
+    assert done.returncode == 1
+    assert "eswaranPope is a forcing of the spectral solver" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_a_gpu_that_is_not_there_is_named(tmp_path):
+    path = make_case(tmp_path / "case", steps=1, prepared=False)
+    done = gbm("run", path, *SPECTRAL, "--device", "gpu")
+    if done.returncode:  # on a machine that has one, it runs
+        assert "needs CuPy and a CUDA device" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize(
     "change, message",
     [
