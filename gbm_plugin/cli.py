@@ -85,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     add_case(sub)
     sub.add_argument("--cells", type=int, nargs="+", default=[24, 32, 48, 64], help="(default: 24 32 48 64)")
     sub.add_argument("--time-step", type=float, default=0.04, help="of the first, in proportion for the others [s]")
+    sub.add_argument("--figure", metavar="PNG", help="also draw the errors against cells and against time spent")
     _add_json(sub)
 
     sub = add("bench", None, "Measure speed beside error; ratios within one run.")
@@ -151,6 +152,12 @@ def _validate(arguments) -> dict:
 
     result = validate(arguments.case, arguments.cells, arguments.time_step)
     print(table(result))
+    if arguments.figure:
+        from .output.figures import convergence_figure
+        from .output.style import styled
+
+        with styled():
+            convergence_figure(result["rows"]).savefig(arguments.figure)
     return result
 
 
