@@ -149,7 +149,7 @@ def advance(
                     w0, w1, w2 = load3(w, links), load3(past, links), load3(far, links)
                     move = add_scaled(add_scaled(scale(c0, w0), c1, w1), c2, w2)
                     store3(out[b], links, add(load3(now, links), move))
-                worst = larger(total, worst)
+                worst = larger(worst, total)  # keeps a NaN of total
                 now, past, far = out[b], w, past
             store(error, b, sqrt((1.0 / links) * worst))
             store(tension, b, sqrt(pull))

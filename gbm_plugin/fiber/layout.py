@@ -3,10 +3,26 @@
 The last block is filled up with copies of the last fiber.
 """
 
+from contextlib import contextmanager
+
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange, set_num_threads
 
 from .simd import LANES, add, add_scaled, cross, dot, load3, scale, splat, store3, subtract, zero3
+
+
+BEADS_PER_THREAD = 2000  # fewer are not worth a second thread
+
+
+@contextmanager
+def threads_for(beads: int):
+    """Use as many threads as so many beads are worth."""
+    available = get_num_threads()
+    set_num_threads(max(1, min(available, beads // BEADS_PER_THREAD)))
+    try:
+        yield
+    finally:
+        set_num_threads(available)
 
 
 @njit(parallel=True, cache=True)

@@ -10,7 +10,7 @@ from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .contact import repulsion_velocity
 from .fibers import Fibers, one_of, positive
-from .layout import bead_positions, pack
+from .layout import bead_positions, pack, threads_for
 from .mobility import MOBILITIES
 from .simd import LANES
 from .strain import with_strain
@@ -50,6 +50,7 @@ class Stepper:
         repulsion=0.0,
     ):
         self.fibers = fibers
+        self._beads = fibers.count * fibers.beads
         self.integrator = one_of("integrator", integrator, INTEGRATORS)
         self.mobility = one_of("mobility", mobility, MOBILITIES)
         self._mobility = MOBILITIES.index(mobility)
@@ -81,7 +82,7 @@ class Stepper:
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
         self._scratch = np.zeros((get_num_threads(), self._scratch_rows(), LANES))
-        self._counts = {"steps": 0, "substeps": 0, "refinements": 0, "refined_fibers": 0, "worst_error": 0.0}
+        self._counts = {"steps": 0, "ab3_steps": 0, "substeps": 0, "refinements": 0, "refined_fibers": 0, "worst_error": 0.0}
 
     def _scratch_rows(self) -> int:
         explicit = ab3.scratch_rows(self._mobility, self.fibers.beads)
@@ -93,7 +94,8 @@ class Stepper:
     def positions(self) -> np.ndarray:
         """(F, N, 3) bead centres now, unwrapped."""
         positions = np.empty((self.fibers.count, self.fibers.beads, 3))
-        bead_positions(self._state, 2 * self.fibers.radius, positions)
+        with threads_for(self._beads):
+            bead_positions(self._state, 2 * self.fibers.radius, positions)
         return positions
 
     @property
@@ -116,7 +118,8 @@ class Stepper:
         if self.repulsion:
             push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
             velocity = velocity + push
-        self._ambient.observe(time, velocity, extra)
+        with threads_for(self._beads):
+            self._ambient.observe(time, velocity, extra)
 
     def _field(self, name, values, tail) -> np.ndarray:
         """Sampled values, if they are (F, N, *tail) and finite."""
@@ -149,14 +152,16 @@ class Stepper:
         self._last_ages, self._last_tension = self._ages, self._tension
         self._last_step = self._step.copy()
         self._counts["steps"] += 1
-        self._run()
+        with threads_for(self._beads):
+            self._run()
 
     def correct(self) -> None:
         """Redo the last step with the sample at its end included."""
         if not self.provisional or self._ambient.times[-1] != self.time:
             raise ValueError("correct() follows a provisional advance() and the observe() at its end")
         self.provisional = False
-        self._run()
+        with threads_for(self._beads):
+            self._run()
 
     def _run(self) -> None:
         """The last step, from its kept start, with the samples that there are."""
@@ -213,7 +218,8 @@ class Stepper:
         self._tension = tension.max()
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
-        self._count(count, error)
+        self._count(count, error if self.integrator == "ab3" else error[error <= self.local_tolerance])
+        self._counts["ab3_steps"] += 1
         return error
 
     def _implicit(self, members: np.ndarray) -> None:

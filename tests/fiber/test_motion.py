@@ -70,7 +70,7 @@ def test_elastic_fiber_in_solid_rotation_is_the_resting_one_seen_turning(integra
     options = {"integrator": integrator, "mobility": mobility, "tolerance": 1e-5}
     turning = simulate(fibers, flow, 0.01, 2.0, **options).positions[-1]
     resting = simulate(fibers, LinearFlow(np.zeros((3, 3))), 0.01, 2.0, **options).positions[-1]
-    assert np.abs(resting - fibers.positions).max() > 0.05  # it did relax
+    assert np.abs(resting - fibers.positions).max() > 0.03  # it did relax
     assert np.abs(turning - resting @ turn(2.0).T).max() < 3e-5 * fibers.contour_length
 
 
