@@ -52,7 +52,8 @@ def stable_step(fibers, softness: float, tension: float) -> float:
 
 
 def plan(ages: list[float], step: float, count: int) -> np.ndarray:
-    """Weights of each of count steps, a row: w_n, w_(n−1), w_(n−2); w_n × w_(n−1); third less second order; start.
+    """Weights of each of count steps, a row: w_n, w_(n−1), w_(n−2); w_n × w_(n−1); third less second order;
+    start.
 
     ages: how long before the first step's start the rates w_(n−1), w_(n−2) were taken, as many as there are.
     """
@@ -103,8 +104,8 @@ def advance(
     """One flow step in len(steps) sub-steps, for every block.
 
     state → out (B, 3N, LANES); newest, older: rates w_(n−1) and w_(n−2), each (given, written); velocity,
-    rotation: SAMPLES each; weights (sub-steps, STAGES, SAMPLES): of the samples; steps: plan(). error (B, LANES):
-    rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
+    rotation: SAMPLES each; weights (sub-steps, STAGES, SAMPLES): of the samples; steps: plan(). error (B,
+    LANES): rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
     """
     count, rows = steps.shape[0], state.shape[1]
     links = rows // 3 - 1

@@ -25,11 +25,12 @@ SMALLEST_STEP = 1e-12  # of a flow step, by implicit
 class Stepper:
     """Time stepping of one family, fed with one sample of the flow at the beads per step.
 
-    integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto" (ab3
-    where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber). tolerance (for
-    implicit and auto; None: 1e-3): bead displacement over fiber length; every accepted step of every fiber is held
-    to a tenth of it, in the rms rotation of its links, so that a relaxation of several steps stays within. repulsion: rate (1/time) at which overlaps of beads that are
-    not neighbours decay; below about 1/time_step.
+    integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto"
+    (ab3 where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber).
+    tolerance (for implicit and auto; None: 1e-3): bead displacement over fiber length. Every accepted step of
+    every fiber is held to a tenth of it, in the rms rotation of its links, so that a relaxation of several
+    steps stays within. repulsion: rate (1/time) at which overlaps of beads that are not neighbours decay;
+    below about 1/time_step.
 
     need says what observe() takes beside the velocity. The loop of a run:
 
@@ -66,7 +67,7 @@ class Stepper:
         self._beta = pack(velocity_scale(fibers))[:, 0]
         self._law = CURVATURE_LAWS.index(fibers.curvature_law)
         blocks, rows = -(-fibers.count // LANES), 3 * fibers.beads
-        # state before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
+        # before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
         self._last = np.zeros((blocks, rows, LANES))
         self._state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
         self._last_multipliers = np.zeros((blocks, rows - 3, LANES))
@@ -82,7 +83,14 @@ class Stepper:
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
         self._scratch = np.zeros((get_num_threads(), self._scratch_rows(), LANES))
-        self._counts = {"steps": 0, "ab3_steps": 0, "substeps": 0, "refinements": 0, "refined_fibers": 0, "worst_error": 0.0}
+        self._counts = {
+            "steps": 0,
+            "ab3_steps": 0,
+            "substeps": 0,
+            "refinements": 0,
+            "refined_fibers": 0,
+            "worst_error": 0.0,
+        }
 
     def _scratch_rows(self) -> int:
         explicit = ab3.scratch_rows(self._mobility, self.fibers.beads)
@@ -209,9 +217,9 @@ class Stepper:
         error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
         new, old = self._spare
         ab3.advance(
-            self._mobility, self._last, (self._last_rates[0], new), (self._last_rates[1], old), velocity, rotation, weights,
-            ab3.plan(self._last_ages, h, count), self._beta, fibers.radius, self._law, self._scratch,
-            self._state, error, tension,
+            self._mobility, self._last, (self._last_rates[0], new), (self._last_rates[1], old),
+            velocity, rotation, weights, ab3.plan(self._last_ages, h, count),
+            self._beta, fibers.radius, self._law, self._scratch, self._state, error, tension,
         )  # fmt: skip
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
@@ -233,8 +241,9 @@ class Stepper:
             remaining = end - elapsed[members]
             trial[members] = remaining / np.ceil(np.maximum(remaining / self._step[members] * (1 - 1e-12), 1))
             implicit.attempt(
-                self._mobility, members, source, lagged, velocity, rotation, times, self._beta, fibers.radius, self._law,
-                self.local_tolerance, self._scratch, trial, self._state, self._multipliers, elapsed, self._step, error,
+                self._mobility, members, source, lagged, velocity, rotation, times,
+                self._beta, fibers.radius, self._law, self.local_tolerance, self._scratch, trial,
+                self._state, self._multipliers, elapsed, self._step, error,
             )  # fmt: skip
             source, lagged = self._state, self._multipliers
             attempts += 1
@@ -263,7 +272,7 @@ class Stepper:
             )
 
     def report(self) -> dict:
-        """Counts since the start: steps, sub-steps, refinements, fibers refined, worst accepted error estimate."""
+        """Counts since the start: steps, sub-steps, refinements, fibers refined, worst accepted estimate."""
         return dict(self._counts)
 
     def state(self) -> dict[str, np.ndarray]:

@@ -15,7 +15,9 @@ STILL = LinearFlow(np.zeros((3, 3)))
 def test_order_with_one_flow_sample_per_step(integrator, order, mobility):
     fibers = Fibers(bent(3, 6, 0.2), 0.01, 1.0)
     end, steps = 1.0, [40, 80, 160, 320]
-    tight = run_once_per_step(fibers, WavyFlow(), end / 4000, 4000, integrator="ab3", mobility=mobility).positions
+    tight = run_once_per_step(
+        fibers, WavyFlow(), end / 4000, 4000, integrator="ab3", mobility=mobility
+    ).positions
     errors = []
     for count in steps:
         last = run_once_per_step(

@@ -12,7 +12,9 @@ def test_simple_shear_fixes_the_convention():
     """u = (2y, 0, 0): du_x/dy is [0, 1], and the rotation ½∇×u is −1 about z."""
     shear = LinearFlow([[0, 2, 0], [0, 0, 0], [0, 0, 0]], velocity=(0, 0, 5))
     velocity, gradient = shear.sample(POINTS, 0.0)
-    np.testing.assert_allclose(velocity, np.stack([2 * POINTS[..., 1], 0 * POINTS[..., 1], 5 + 0 * POINTS[..., 1]], -1))
+    np.testing.assert_allclose(
+        velocity, np.stack([2 * POINTS[..., 1], 0 * POINTS[..., 1], 5 + 0 * POINTS[..., 1]], -1)
+    )
     assert gradient.shape == (4, 5, 3, 3) and (gradient[..., 0, 1] == 2).all()
     _, rotation = shear.sample(POINTS, 0.0, "rotation")
     assert (rotation == [0, 0, -1]).all()
@@ -20,7 +22,8 @@ def test_simple_shear_fixes_the_convention():
 
 
 @pytest.mark.parametrize(
-    "flow", [TaylorGreen(1.7, 0.6), LinearFlow([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6], [0.7, 0.8, -0.6]], (1, 2, 3))]
+    "flow",
+    [TaylorGreen(1.7, 0.6), LinearFlow([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6], [0.7, 0.8, -0.6]], (1, 2, 3))],
 )
 def test_gradient_and_rotation_are_those_of_the_velocity(flow):
     _, gradient = flow.sample(POINTS, 0.0, "gradient")
