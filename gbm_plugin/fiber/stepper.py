@@ -19,7 +19,7 @@ INTEGRATORS = ("ab3", "implicit", "auto")
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
-SMALLEST_STEP = 1e-12  # of a flow step, by implicit
+SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open within 1e-14
 
 
 class Stepper:
