@@ -52,7 +52,8 @@ def stable_step(fibers, softness: float, tension: float) -> float:
 
 
 def plan(ages: list[float], step: float, count: int) -> np.ndarray:
-    """Weights of each of count steps, a row: w_n, w_(n−1), w_(n−2); w_n × w_(n−1); third less second order; start.
+    """Weights of each of count steps, a row: w_n, w_(n−1), w_(n−2); w_n × w_(n−1); third less second order;
+    start.
 
     ages: how long before the first step's start the rates w_(n−1), w_(n−2) were taken, as many as there are.
     """
@@ -103,8 +104,8 @@ def advance(
     """One flow step in len(steps) sub-steps, for every block.
 
     state → out (B, 3N, LANES); newest, older: rates w_(n−1) and w_(n−2), each (given, written); velocity,
-    rotation: SAMPLES each; weights (sub-steps, STAGES, SAMPLES): of the samples; steps: plan(). error (B, LANES):
-    rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
+    rotation: SAMPLES each; weights (sub-steps, STAGES, SAMPLES): of the samples; steps: plan(). error (B,
+    LANES): rms over links of |third − second order| rotation, largest sub-step; tension: largest |e·λ|.
     """
     count, rows = steps.shape[0], state.shape[1]
     links = rows // 3 - 1
@@ -149,7 +150,7 @@ def advance(
                     w0, w1, w2 = load3(w, links), load3(past, links), load3(far, links)
                     move = add_scaled(add_scaled(scale(c0, w0), c1, w1), c2, w2)
                     store3(out[b], links, add(load3(now, links), move))
-                worst = larger(total, worst)
+                worst = larger(worst, total)  # keeps a NaN of total
                 now, past, far = out[b], w, past
             store(error, b, sqrt((1.0 / links) * worst))
             store(tension, b, sqrt(pull))

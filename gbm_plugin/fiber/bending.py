@@ -1,9 +1,10 @@
 """Bending: curvature laws, their energies, and the torque coefficient.
 
-The moment at an inner bead between links t and t' is m = (K/2a) f(t·t') t × t', f = 1 for the paper's law
-κ = sin θ/2a (eqs. 3–5) and f = 2/(1 + cos θ) for the discrete elastic rod, κ = 2 tan(θ/2)/2a. Neither divides by
-|t × t'|: collinear links feel no moment. Rolling makes the rotation rate of a link the mean of its beads' rates,
-so the torque conjugate to the energy is γ_i = ½ (m_(i+1) − m_(i−1)); eq. (6) as printed lacks the ½.
+The moment at an inner bead between links t and t' is m = (K/2a) f(t·t') t × t', f = 1 for the paper's law κ
+= sin θ/2a (eqs. 3–5) and f = 2/(1 + cos θ) for the discrete elastic rod, κ = 2 tan(θ/2)/2a. Neither divides
+by |t × t'|: collinear links feel no moment. Rolling makes the rotation rate of a link the mean of its
+beads' rates, so the torque conjugate to the energy is γ_i = ½ (m_(i+1) − m_(i−1)); eq. (6) as printed lacks
+the ½.
 """
 
 import numpy as np

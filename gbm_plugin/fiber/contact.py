@@ -38,8 +38,8 @@ def self_contacts(positions: np.ndarray, diameter: float) -> np.ndarray:
 def repulsion_velocity(positions: np.ndarray, diameter: float, rate: float) -> np.ndarray:
     """(F, N, 3) velocities that part overlapping pairs: their overlap decays at the given rate (1/time).
 
-    The force behind it is linear in the overlap and of zero range beyond contact; it acts through each bead's own
-    drag, is evaluated with the flow sample, and needs rate × flow step below about 1.
+    The force behind it is linear in the overlap and of zero range beyond contact; it acts through each
+    bead's own drag, is evaluated with the flow sample, and needs rate × flow step below about 1.
     """
     velocity = np.zeros(positions.shape)
     _push(np.ascontiguousarray(positions), diameter, rate, velocity)

@@ -18,7 +18,7 @@ def one_of(name: str, value: str, allowed) -> str:
 
 
 def finite_array(name: str, value, shape_text: str, dimensions: int) -> np.ndarray:
-    """value as a float64 array of the given number of dimensions, last one 3, without NaN; else ValueError."""
+    """value as a float64 array of so many dimensions, the last 3, and finite; else ValueError."""
     array = np.array(value, dtype=float)
     if array.ndim != dimensions or array.shape[-1] != 3:
         raise ValueError(f"{name} has shape {array.shape}; it must be {shape_text}")
@@ -38,11 +38,11 @@ def positive(name: str, value: float, zero: bool = False) -> float:
 class Fibers:
     """Inextensible elastic fibers of equal bead number and radius (Gears Bead Model, section 2.1).
 
-    positions: (F, N, 3) bead centres, unwrapped, neighbours one diameter 2a apart (to 1e-6; the state then holds
-    the centre of mass and unit links, so that the length is exact). bending_stiffness: K^b, force × area, one
-    number or (F,); None if young_modulus E is given instead, K^b = E π d⁴/64 (eq. 10). viscosity: dynamic, μ.
-    bending_torque: "consistent" (energy-consistent) or "asPrinted" (eq. 6, twice as stiff). curvature_law:
-    "sine" (eq. 4) or "discreteRod" (tan(θ/2)/a). Raises ValueError on anything else.
+    positions: (F, N, 3) bead centres, unwrapped, neighbours one diameter 2a apart (to 1e-6; the state then
+    holds the centre of mass and unit links, so that the length is exact). bending_stiffness: K^b, force ×
+    area, one number or (F,); None if young_modulus E is given instead, K^b = E π d⁴/64 (eq. 10). viscosity:
+    dynamic, μ. bending_torque: "consistent" (energy-consistent) or "asPrinted" (eq. 6, twice as stiff).
+    curvature_law: "sine" (eq. 4) or "discreteRod" (tan(θ/2)/a). Raises ValueError on anything else.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class Fibers:
 
     @property
     def curvature(self) -> np.ndarray:
-        """(F, N−2) |t_i × t_(i+1)|/2a at the inner beads (eq. 5), whatever the curvature law of the torque."""
+        """(F, N−2) |t_i × t_(i+1)|/2a at the inner beads (eq. 5), whatever the law of the torque."""
         return np.linalg.norm(np.cross(self.links[:, :-1], self.links[:, 1:]), axis=2) / (2 * self.radius)
 
     @property

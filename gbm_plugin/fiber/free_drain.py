@@ -19,7 +19,20 @@ from numba import njit
 from .bending import moment
 from .layout import difference, mean_vector
 from .matrix3 import apply_symmetric, inverse_symmetric, load6
-from .simd import add, add_scaled, cross, dot, larger, load, load3, scale, splat, store, store3, subtract, zero3
+from .simd import (
+    add,
+    add_scaled,
+    cross,
+    dot,
+    larger,
+    load3,
+    scale,
+    splat,
+    store,
+    store3,
+    subtract,
+    zero3,
+)
 
 
 @njit(forceinline=True)

@@ -1,11 +1,13 @@
-"""Linearly implicit steps: the Rosenbrock pair 2(3) of Shampine & Reichelt (1997, ode23s) for links that turn.
+"""Linearly implicit steps: the Rosenbrock pair 2(3) of Shampine & Reichelt (1997), for links that turn.
 
-Second order whatever the Jacobian, L-stable, with an error estimate of third order. With d = 1/(2 + √2), stage j
-solves k = f + h d J (k + κ) at its own links, so that nothing stiff is ever evaluated explicitly:
+Second order whatever the Jacobian, L-stable, with an error estimate of third order. With d = 1/(2 + √2),
+stage j solves k = f + h d J (k + κ) at its own links, so that nothing stiff is ever evaluated explicitly:
 
-    k₁ at the links e, flow at t + dh, κ = 0;             k₂ at exp(h k₁/2) e, flow at t + h/2, κ = −k₁;
-    e' = exp(h k₂) e;                                      k₃ at e', flow at t + h − dh, κ = −(6 + √2)(k₂ − k₁) − 2 k₁;
-    error = (h/6)(k₁ − 2k₂ + k₃), rms over the links: rad, which is to say bead displacement / fiber length.
+    k₁: links e,             flow at t + dh,      κ = 0
+    k₂: links exp(h k₁/2) e, flow at t + h/2,     κ = −k₁
+    e' = exp(h k₂) e
+    k₃: links e',            flow at t + h − dh,  κ = −(6 + √2)(k₂ − k₁) − 2 k₁
+    error = (h/6)(k₁ − 2k₂ + k₃), rms over the links: rad, which is bead displacement over fiber length.
 
 Every fiber has its own step inside the flow step: rejected ones try again with less, accepted ones go on.
 """
@@ -16,7 +18,18 @@ from numba import njit, prange
 from .ab3 import turn_links
 from .ambient import SAMPLES
 from .mobility import stage, work_rows
-from .simd import LANES, add, add_scaled, dot, load, load3, scale, smaller, splat, sqrt, store, store3, subtract
+from .simd import (
+    LANES,
+    add,
+    add_scaled,
+    dot,
+    load,
+    load3,
+    smaller,
+    splat,
+    sqrt,
+    store,
+)
 
 D = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
@@ -80,9 +93,10 @@ def attempt(
 ):  # fmt: skip
     """One step of its own size for every fiber in members, accepted where the error estimate allows.
 
-    source → out (B, 3N, LANES), lagged → out_lagged (B, 3(N−1), LANES): links and multipliers; velocity, rotation:
-    SAMPLES samples each, the first len(times) of them valid at times, counted from the start of the flow step. Per fiber: trial, the step to try; elapsed, step, error: time reached, suggested next step, and
-    error estimate, updated.
+    source → out (B, 3N, LANES), lagged → out_lagged (B, 3(N−1), LANES): links and multipliers; velocity,
+    rotation: SAMPLES samples each, the first len(times) of them valid at times, counted from the start of
+    the flow step. Per fiber: trial, the step to try; elapsed, step, error: time reached, suggested next
+    step, and error estimate, updated.
     """
     rows = source.shape[1]
     links = rows // 3 - 1
@@ -126,12 +140,28 @@ def attempt(
                 elif s == 1:
                     for row in range(rows):
                         store(history, row, -load(k1, row))
-                    stage(mobility, middle, u, spin, history, tension, sigma, stiff, radius, law, rest, tension, k2)
+                    stage(
+                        mobility,
+                        middle,
+                        u,
+                        spin,
+                        history,
+                        tension,
+                        sigma,
+                        stiff,
+                        radius,
+                        law,
+                        rest,
+                        tension,
+                        k2,
+                    )
                     turn_links(now, k2, h, new)
                 else:
                     for row in range(rows):
                         store(history, row, (E32 - 2.0) * load(k1, row) - E32 * load(k2, row))
-                    stage(mobility, new, u, spin, history, tension, sigma, stiff, radius, law, rest, tension, k3)
+                    stage(
+                        mobility, new, u, spin, history, tension, sigma, stiff, radius, law, rest, tension, k3
+                    )
             total = splat(0.0)
             for i in range(links):
                 gap = add_scaled(add(load3(k1, i), load3(k3, i)), -2.0, load3(k2, i))

@@ -1,22 +1,47 @@
 """One linearly implicit stage in free drain: the bending and contact torques are taken at links e + δe.
 
-With δe = h d (de/dt + κ × e) linear in the unknown multipliers, 2a de/dt = ΔU + Dλ, D the second difference, the
-rolling equations of free_drain become
+With δe = h d (de/dt + κ × e) linear in the unknown multipliers, 2a de/dt = ΔU + Dλ, D the second
+difference, the rolling equations of free_drain become
 
     A λ + σ Σ_k E_ik (D λ)_k = right side − σ Σ_k E_ik (ΔU + 2a κ × e)_k,     σ = h d/2a,
 
-where E_ik, k = i − 2 … i + 2, is minus the derivative of e_i × [β(M_(i+1) − M_(i−1) + M_(i+2) − M_i)
-+ ¾(2 e_i × λ_i + e_(i−1) × λ_(i−1) + e_(i+1) × λ_(i+1))] with respect to the links in the bracket: bending, and the
-stiffness that contact forces give to a taut chain. Every E_ik is α I + p e_iᵀ (plus one outer product per joint for
-the discrete rod), and the matrix has seven block diagonals. It is solved by block elimination, O(N).
+where E_ik, k = i − 2 … i + 2, is minus the derivative of e_i × [β(M_(i+1) − M_(i−1) + M_(i+2) − M_i) + ¾(2
+e_i × λ_i + e_(i−1) × λ_(i−1) + e_(i+1) × λ_(i+1))] with respect to the links in the bracket: bending, and
+the stiffness that contact forces give to a taut chain. Every E_ik is α I + p e_iᵀ (plus one outer product
+per joint for the discrete rod), and the matrix has seven block diagonals. It is solved by block
+elimination, O(N).
 """
 
 from numba import njit
 
 from .bending import FOLD
 from .layout import difference, mean_vector
-from .matrix3 import apply, identity_plus, inverse, load9, minus_apply, minus_product, plus_outer, product, store9
-from .simd import add, add_scaled, cross, dot, larger, load, load3, scale, splat, store, store3, subtract, zero3
+from .matrix3 import (
+    apply,
+    identity_plus,
+    inverse,
+    load9,
+    minus_apply,
+    minus_product,
+    plus_outer,
+    product,
+    store9,
+)
+from .simd import (
+    add,
+    add_scaled,
+    cross,
+    dot,
+    larger,
+    load,
+    load3,
+    scale,
+    splat,
+    store,
+    store3,
+    subtract,
+    zero3,
+)
 
 PAD = 2  # zero vectors before and after the links of a padded array: no special rows at the ends
 
@@ -57,7 +82,7 @@ def _second_difference3(left, here, right):
 
 @njit(forceinline=True)
 def _outer_joint(row, y, t, u):
-    """Add y (D-combination of t, u)ᵀ to four neighbouring blocks: derivative of a joint's f, y its direction."""
+    """Add y (D-combination of t, u)ᵀ to four blocks of a row: derivative of a joint's f."""
     a, b, c, d = row
     return (
         plus_outer(a, y, u),
@@ -71,12 +96,17 @@ def _outer_joint(row, y, t, u):
 def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, work, multipliers, rates):
     """Rates (3N, LANES) of a stage at the links of state, and its multipliers (3(N−1), LANES).
 
-    history (3N, LANES): κ, rotation rates added to the unknown ones in δe; lagged: the multipliers in E; sigma:
-    h d/2a per lane; work: scratch of work_rows(N) rows.
+    history (3N, LANES): κ, rotation rates added to the unknown ones in δe; lagged: the multipliers in E;
+    sigma: h d/2a per lane; work: scratch of work_rows(N) rows.
     """
     links = rates.shape[0] // 3 - 1
     size = 3 * (links + 2 * PAD)
-    e, g, tension, moments = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size : 4 * size]
+    e, g, tension, moments = (
+        work[:size],
+        work[size : 2 * size],
+        work[2 * size : 3 * size],
+        work[3 * size : 4 * size],
+    )
     at = 4 * size
     factor, slope = work[at : at + size // 3], work[at + size // 3 : at + 2 * size // 3]
     at += size

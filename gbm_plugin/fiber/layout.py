@@ -3,10 +3,25 @@
 The last block is filled up with copies of the last fiber.
 """
 
+from contextlib import contextmanager
+
 import numpy as np
-from numba import njit, prange
+from numba import get_num_threads, njit, prange, set_num_threads
 
 from .simd import LANES, add, add_scaled, cross, dot, load3, scale, splat, store3, subtract, zero3
+
+BEADS_PER_THREAD = 2000  # fewer are not worth a second thread
+
+
+@contextmanager
+def threads_for(beads: int):
+    """Use as many threads as so many beads are worth."""
+    available = get_num_threads()
+    set_num_threads(max(1, min(available, beads // BEADS_PER_THREAD)))
+    try:
+        yield
+    finally:
+        set_num_threads(available)
 
 
 @njit(parallel=True, cache=True)
@@ -67,7 +82,8 @@ def bead_positions(state, diameter, positions):
 def rotated(link, angle):
     """Unit link turned by the rotation vector angle: exactly a rotation, of size |angle| to O(|angle|⁷).
 
-    Gibbs vector g = tan(|φ|/2) φ/|φ|, its tangent as a series; one Newton step keeps the length from drifting.
+    Gibbs vector g = tan(|φ|/2) φ/|φ|, its tangent as a series; one Newton step keeps the length from
+    drifting.
     """
     square = dot(angle, angle)
     gibbs = scale(0.5 + square * (1.0 / 24.0 + square * (1.0 / 240.0)), angle)

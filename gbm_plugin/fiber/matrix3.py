@@ -1,4 +1,4 @@
-"""3×3 matrices of lanes: tuples of nine, row by row; symmetric ones tuples of six (xx, xy, xz, yy, yz, zz)."""
+"""3×3 matrices of lanes: tuples of nine, row by row; symmetric ones of six (xx, xy, xz, yy, yz, zz)."""
 
 from numba import njit
 

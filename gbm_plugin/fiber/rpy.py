@@ -1,8 +1,9 @@
-"""Rotne–Prager–Yamakawa mobility: beads move and spin each other, overlapping ones too; dense solves per fiber.
+"""Rotne–Prager–Yamakawa mobility: beads move and spin each other, overlapping ones too; dense solves per
+fiber.
 
-Tensors of Wajnryb, Mizerski, Zuk & Szymczak (2013) and Zuk et al. (2014) for equal spheres. Forces F are scaled by
-1/6πμa and torques T by 1/6πμa², so that all are velocities, and spins are times a. With r in units of a and n from
-bead j to bead i,
+Tensors of Wajnryb, Mizerski, Zuk & Szymczak (2013) and Zuk et al. (2014) for equal spheres. Forces F are
+scaled by 1/6πμa and torques T by 1/6πμa², so that all are velocities, and spins are times a. With r in
+units of a and n from bead j to bead i,
 
     v_i = (A I + B n nᵀ) F_j + q T_j × n,       a ω_i = q F_j × n + ¾ (C I + D n nᵀ) T_j.
 
@@ -127,7 +128,8 @@ def _dot_rows(a, first_a, stride, b, first_b, count):
 def assemble(state, radius, pairs, factor, gaps, v, s):
     """Cholesky factor (lower, its diagonal inverted) of the constraint matrix, and gaps from multipliers.
 
-    Column 3k + c of gaps (3N, 3(N−1)) holds, for a unit multiplier of link k, all v_(i+1) − v_i and the mean v.
+    Column 3k + c of gaps (3N, 3(N−1)) holds, for a unit multiplier of link k, all v_(i+1) − v_i and the
+    mean v.
     """
     links = state.shape[0] // 3 - 1
     n = 3 * links
@@ -181,7 +183,7 @@ def assemble(state, radius, pairs, factor, gaps, v, s):
 
 @njit
 def roll(state, factor, gaps, v, s, multipliers, out):
-    """Multipliers that stop the slip of velocities v and spins s; out: the gaps and mean velocity that result."""
+    """Multipliers that stop the slip of velocities v and spins s; out: resulting gaps and mean velocity."""
     links = state.shape[0] // 3 - 1
     n = 3 * links
     for i in range(links):
@@ -296,8 +298,8 @@ def _moment_change(state, g, j, law):
 def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, work, multipliers, rates):
     """As implicit_drain.stage, with this mobility: the unknowns are the joint moments βM at links e + δe.
 
-    With W their response in the gaps 2a de/dt, and C the derivative of M, (I − βσ C W) βM = β (M + σ C g), g the
-    gaps without bending plus 2a κ × e: compliant and rigid joints alike are well conditioned.
+    With W their response in the gaps 2a de/dt, and C the derivative of M, (I − βσ C W) βM = β (M + σ C g),
+    g the gaps without bending plus 2a κ × e: compliant and rigid joints alike are well conditioned.
     """
     links = state.shape[0] // 3 - 1
     n, m = 3 * links, 3 * (links - 1)
@@ -339,7 +341,9 @@ def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, 
                 _, change = _moment_change(state, gap_column, i, law)
                 for d in range(3):
                     row = 3 * (i - 1) + d
-                    store(matrix, row * m + column, (one if row == column else none) - beta * sigma * change[d])
+                    store(
+                        matrix, row * m + column, (one if row == column else none) - beta * sigma * change[d]
+                    )
     ambient(velocity, rotation, radius, v, s)
     roll(state, factor, gaps, v, s, multipliers, free)
     for i in range(links):

@@ -63,7 +63,9 @@ def store(typingctx, array, row, value):
 
 
 def _splat(builder, scalar):
-    vector = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+    vector = builder.insert_element(
+        ir.Constant(_VECTOR, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0)
+    )
     zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
     return builder.shuffle_vector(vector, ir.Constant(_VECTOR, ir.Undefined), zeros)
 

@@ -36,14 +36,23 @@ def simulate(
 ):
     """Trajectory of fibers carried by flow from time 0 to end_time; a list of them for a list of families.
 
-    The flow is sampled once per time_step with ab3. With implicit and auto a time step is divided where the flow
-    along the paths changes too fast to be extrapolated within the tolerance (always in the first steps, which
-    have no history). record_every: steps between records; None records the end only. Other options as in Stepper;
-    the flow's sample() as in gbm_plugin.flow. The fibers themselves are not changed. Raises ValueError on unknown
-    words and bad numbers, FloatingPointError on NaN.
+    The flow is sampled once per time_step with ab3. With implicit and auto a time step is divided where the
+    flow along the paths changes too fast to be extrapolated within the tolerance (always in the first
+    steps, which have no history). record_every: steps between records; None records the end only. Other
+    options as in Stepper; the flow's sample() as in gbm_plugin.flow. The fibers themselves are not changed.
+    Raises ValueError on unknown words and bad numbers, FloatingPointError on NaN.
     """
     if not isinstance(fibers, Fibers):
-        options = (time_step, end_time, integrator, mobility, strain_coupling, tolerance, record_every, repulsion)
+        options = (
+            time_step,
+            end_time,
+            integrator,
+            mobility,
+            strain_coupling,
+            tolerance,
+            record_every,
+            repulsion,
+        )
         return [simulate(family, flow, *options) for family in fibers]
     step, end = positive("time_step", time_step), positive("end_time", end_time)
     if record_every is not None and (int(record_every) != record_every or record_every < 1):
@@ -78,7 +87,7 @@ def _sample(stepper: Stepper, flow) -> None:
 
 
 def _pieces(pieces: int, error: float, stepper: Stepper) -> int:
-    """Parts of the next time step: twice as many or half as many as of the last, from its error (fourth order)."""
+    """Parts of the next time step: twice or half as many as of the last, from its (fourth-order) error."""
     if error > stepper.local_tolerance:
         return min(2 * pieces, MOST_PIECES)
     return max(1, pieces // 2) if 16 * error < stepper.local_tolerance else pieces

@@ -10,7 +10,7 @@ from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .contact import repulsion_velocity
 from .fibers import Fibers, one_of, positive
-from .layout import bead_positions, pack
+from .layout import bead_positions, pack, threads_for
 from .mobility import MOBILITIES
 from .simd import LANES
 from .strain import with_strain
@@ -19,17 +19,18 @@ INTEGRATORS = ("ab3", "implicit", "auto")
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
-SMALLEST_STEP = 1e-12  # of a flow step, by implicit
+SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open within 1e-14
 
 
 class Stepper:
     """Time stepping of one family, fed with one sample of the flow at the beads per step.
 
-    integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto" (ab3
-    where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber). tolerance (for
-    implicit and auto; None: 1e-3): bead displacement over fiber length; every accepted step of every fiber is held
-    to a tenth of it, in the rms rotation of its links, so that a relaxation of several steps stays within. repulsion: rate (1/time) at which overlaps of beads that are
-    not neighbours decay; below about 1/time_step.
+    integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto"
+    (ab3 where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber).
+    tolerance (for implicit and auto; None: 1e-3): bead displacement over fiber length. Every accepted step of
+    every fiber is held to a tenth of it, in the rms rotation of its links, so that a relaxation of several
+    steps stays within. repulsion: rate (1/time) at which overlaps of beads that are not neighbours decay;
+    below about 1/time_step.
 
     need says what observe() takes beside the velocity. The loop of a run:
 
@@ -50,6 +51,7 @@ class Stepper:
         repulsion=0.0,
     ):
         self.fibers = fibers
+        self._beads = fibers.count * fibers.beads
         self.integrator = one_of("integrator", integrator, INTEGRATORS)
         self.mobility = one_of("mobility", mobility, MOBILITIES)
         self._mobility = MOBILITIES.index(mobility)
@@ -65,7 +67,7 @@ class Stepper:
         self._beta = pack(velocity_scale(fibers))[:, 0]
         self._law = CURVATURE_LAWS.index(fibers.curvature_law)
         blocks, rows = -(-fibers.count // LANES), 3 * fibers.beads
-        # state before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
+        # before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
         self._last = np.zeros((blocks, rows, LANES))
         self._state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
         self._last_multipliers = np.zeros((blocks, rows - 3, LANES))
@@ -81,7 +83,14 @@ class Stepper:
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
         self._scratch = np.zeros((get_num_threads(), self._scratch_rows(), LANES))
-        self._counts = {"steps": 0, "substeps": 0, "refinements": 0, "refined_fibers": 0, "worst_error": 0.0}
+        self._counts = {
+            "steps": 0,
+            "ab3_steps": 0,
+            "substeps": 0,
+            "refinements": 0,
+            "refined_fibers": 0,
+            "worst_error": 0.0,
+        }
 
     def _scratch_rows(self) -> int:
         explicit = ab3.scratch_rows(self._mobility, self.fibers.beads)
@@ -93,7 +102,8 @@ class Stepper:
     def positions(self) -> np.ndarray:
         """(F, N, 3) bead centres now, unwrapped."""
         positions = np.empty((self.fibers.count, self.fibers.beads, 3))
-        bead_positions(self._state, 2 * self.fibers.radius, positions)
+        with threads_for(self._beads):
+            bead_positions(self._state, 2 * self.fibers.radius, positions)
         return positions
 
     @property
@@ -116,7 +126,8 @@ class Stepper:
         if self.repulsion:
             push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
             velocity = velocity + push
-        self._ambient.observe(time, velocity, extra)
+        with threads_for(self._beads):
+            self._ambient.observe(time, velocity, extra)
 
     def _field(self, name, values, tail) -> np.ndarray:
         """Sampled values, if they are (F, N, *tail) and finite."""
@@ -149,14 +160,16 @@ class Stepper:
         self._last_ages, self._last_tension = self._ages, self._tension
         self._last_step = self._step.copy()
         self._counts["steps"] += 1
-        self._run()
+        with threads_for(self._beads):
+            self._run()
 
     def correct(self) -> None:
         """Redo the last step with the sample at its end included."""
         if not self.provisional or self._ambient.times[-1] != self.time:
             raise ValueError("correct() follows a provisional advance() and the observe() at its end")
         self.provisional = False
-        self._run()
+        with threads_for(self._beads):
+            self._run()
 
     def _run(self) -> None:
         """The last step, from its kept start, with the samples that there are."""
@@ -204,16 +217,17 @@ class Stepper:
         error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
         new, old = self._spare
         ab3.advance(
-            self._mobility, self._last, (self._last_rates[0], new), (self._last_rates[1], old), velocity, rotation, weights,
-            ab3.plan(self._last_ages, h, count), self._beta, fibers.radius, self._law, self._scratch,
-            self._state, error, tension,
+            self._mobility, self._last, (self._last_rates[0], new), (self._last_rates[1], old),
+            velocity, rotation, weights, ab3.plan(self._last_ages, h, count),
+            self._beta, fibers.radius, self._law, self._scratch, self._state, error, tension,
         )  # fmt: skip
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
         self._tension = tension.max()
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
-        self._count(count, error)
+        self._count(count, error if self.integrator == "ab3" else error[error <= self.local_tolerance])
+        self._counts["ab3_steps"] += 1
         return error
 
     def _implicit(self, members: np.ndarray) -> None:
@@ -227,8 +241,9 @@ class Stepper:
             remaining = end - elapsed[members]
             trial[members] = remaining / np.ceil(np.maximum(remaining / self._step[members] * (1 - 1e-12), 1))
             implicit.attempt(
-                self._mobility, members, source, lagged, velocity, rotation, times, self._beta, fibers.radius, self._law,
-                self.local_tolerance, self._scratch, trial, self._state, self._multipliers, elapsed, self._step, error,
+                self._mobility, members, source, lagged, velocity, rotation, times,
+                self._beta, fibers.radius, self._law, self.local_tolerance, self._scratch, trial,
+                self._state, self._multipliers, elapsed, self._step, error,
             )  # fmt: skip
             source, lagged = self._state, self._multipliers
             attempts += 1
@@ -257,7 +272,7 @@ class Stepper:
             )
 
     def report(self) -> dict:
-        """Counts since the start: steps, sub-steps, refinements, fibers refined, worst accepted error estimate."""
+        """Counts since the start: steps, sub-steps, refinements, fibers refined, worst accepted estimate."""
         return dict(self._counts)
 
     def state(self) -> dict[str, np.ndarray]:

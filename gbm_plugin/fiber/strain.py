@@ -1,7 +1,8 @@
 """Ambient strain felt through the neighbours: leading-order stresslets of rigid spheres (with mobility rpy).
 
-A sphere in the strain E disturbs the flow as a stresslet (20/3)πμa³E; the others are carried by its field, averaged
-over their surfaces (Faxén; Zuk, Wajnryb, Mizerski & Szymczak 2014). With x from the source, lengths in a,
+A sphere in the strain E disturbs the flow as a stresslet (20/3)πμa³E; the others are carried by its field,
+averaged over their surfaces (Faxén; Zuk, Wajnryb, Mizerski & Szymczak 2014). With x from the source,
+lengths in a,
 
     u = α E·x + γ x (x·E·x)/r²,    ω = g (E·x) × x/r²,
     r > 2:  α = −8/3 r⁻⁵,        γ = −5/2 r⁻³ + 20/3 r⁻⁵,    g = −5/2 r⁻³,
@@ -45,7 +46,8 @@ def _disturb(positions, strain, radius, velocity, rotation):
 
 
 def with_strain(positions, velocity, gradient, radius):
-    """Velocity and rotation (F, N, 3) that carry each bead: the ambient ones plus what the others' stresslets add.
+    """Velocity and rotation (F, N, 3) that carry each bead: the ambient ones plus what the others'
+    stresslets add.
 
     gradient: (F, N, 3, 3), [..., i, j] = du_i/dx_j, at the beads.
     """

@@ -14,7 +14,7 @@ def _checked(need: str) -> str:
 
 
 class LinearFlow:
-    """u(x) = velocity + gradient · x, steady; gradient[i, j] = du_i/dx_j. ValueError unless 3×3, 3, finite."""
+    """u(x) = velocity + gradient · x, steady; gradient[i, j] = du_i/dx_j, all finite, else ValueError."""
 
     def __init__(self, gradient, velocity=(0, 0, 0)):
         self.gradient = np.array(gradient, dtype=float)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gbm_plugin.fiber import Fibers, Stepper
+from gbm_plugin.fiber import Stepper
 
 
 def positions_of(links, diameter):
@@ -44,7 +44,7 @@ class WavyFlow:
 
 
 def run_once_per_step(fibers, flow, step, steps, **options):
-    """A coupled run: one sample of the flow per step, the first two steps corrected. The stepper at the end."""
+    """A coupled run: one flow sample per step, the first two steps corrected. The stepper at the end."""
     stepper = Stepper(fibers, **options)
 
     def sample():
@@ -76,7 +76,9 @@ def rpy_matrix(x, a, viscosity):
             e = d / r if r > 0 else np.array([1.0, 0, 0])
             ee, one = np.outer(e, e), np.eye(3)
             if r > 2 * a:
-                tt = ((1 + 2 * a**2 / (3 * r**2)) * one + (1 - 2 * a**2 / r**2) * ee) / (8 * np.pi * viscosity * r)
+                tt = ((1 + 2 * a**2 / (3 * r**2)) * one + (1 - 2 * a**2 / r**2) * ee) / (
+                    8 * np.pi * viscosity * r
+                )
                 rr = (3 * ee - one) / (16 * np.pi * viscosity * r**3)
                 tr = 1 / (8 * np.pi * viscosity * r**2)
             else:
@@ -92,7 +94,7 @@ def rpy_matrix(x, a, viscosity):
 
 
 def dense_solution(fibers, fiber, velocity, rotation, mobility="freeDrain"):
-    """Bead velocities, rotations and contact forces of one fiber from the full 6N system, straight from the text."""
+    """Bead velocities, rotations and contact forces of one fiber from the full 6N system."""
     x, e = fibers.positions[fiber], fibers.links[fiber]
     n, a, mu = fibers.beads, fibers.radius, fibers.viscosity
     rolling = np.zeros((3 * (n - 1), 6 * n))

@@ -16,8 +16,8 @@ def aspect_ratio(beads, mobility="freeDrain", strain_coupling=False):
     fibers = Fibers(straight_chain(beads, 0.1, (0, 1, 0)), 1e6 * 1e-4, 1.0)
     end = 1.1 * np.pi * beads / (1.35 if mobility == "freeDrain" else 1.25)
     trajectory = simulate(
-        fibers, SHEAR, 0.1, end, mobility=mobility, strain_coupling=strain_coupling,
-        tolerance=1e-4, record_every=1,
+        fibers, SHEAR, 0.2, end, mobility=mobility, strain_coupling=strain_coupling,
+        tolerance=1e-4 if mobility == "freeDrain" else 1e-3, record_every=1,
     )  # fmt: skip
     ends = trajectory.positions[:, 0, -1] - trajectory.positions[:, 0, 0]
     angle = np.unwrap(np.arctan2(ends[:, 0], ends[:, 1]))
@@ -70,7 +70,7 @@ def test_elastic_fiber_in_solid_rotation_is_the_resting_one_seen_turning(integra
     options = {"integrator": integrator, "mobility": mobility, "tolerance": 1e-5}
     turning = simulate(fibers, flow, 0.01, 2.0, **options).positions[-1]
     resting = simulate(fibers, LinearFlow(np.zeros((3, 3))), 0.01, 2.0, **options).positions[-1]
-    assert np.abs(resting - fibers.positions).max() > 0.05  # it did relax
+    assert np.abs(resting - fibers.positions).max() > 0.03  # it did relax
     assert np.abs(turning - resting @ turn(2.0).T).max() < 3e-5 * fibers.contour_length
 
 
@@ -92,7 +92,9 @@ def test_results_turn_with_the_frame_and_do_not_depend_on_bead_order(integrator,
     positions = bent(3, 9, 0.1)
     options = {"step": 0.05, "steps": 20, "integrator": integrator, "mobility": mobility}
     plain = run_once_per_step(Fibers(positions, 0.002, 1.0), WavyFlow(), **options).positions
-    turned = run_once_per_step(Fibers(positions @ matrix.T, 0.002, 1.0), Turned(WavyFlow(), matrix), **options)
+    turned = run_once_per_step(
+        Fibers(positions @ matrix.T, 0.002, 1.0), Turned(WavyFlow(), matrix), **options
+    )
     back = run_once_per_step(Fibers(positions[:, ::-1], 0.002, 1.0), WavyFlow(), **options)
     assert np.abs(turned.positions - plain @ matrix.T).max() < 1e-10
     assert np.abs(back.positions[:, ::-1] - plain).max() < 1e-10
@@ -100,12 +102,12 @@ def test_results_turn_with_the_frame_and_do_not_depend_on_bead_order(integrator,
 
 def test_a_fiber_does_not_depend_on_its_batch():
     positions = bent(19, 9, 0.1)
-    together = simulate(Fibers(positions, 0.002, 1.0), WavyFlow(), 0.1, 1.0, tolerance=1e-2).positions[-1]
     options = {"step": 0.1, "steps": 10, "integrator": "implicit", "tolerance": 1e-5}
     together = run_once_per_step(Fibers(positions, 0.002, 1.0), WavyFlow(), **options).positions
     for one in (0, 7, 8, 18):
         alone = run_once_per_step(Fibers(positions[one : one + 1], 0.002, 1.0), WavyFlow(), **options)
-        assert (alone.positions[0] == together[one]).all()
+        # the radius of a family is the mean of its spacings: equal to rounding
+        assert np.abs(alone.positions[0] - together[one]).max() < 1e-12
 
 
 def test_families_ride_in_one_flow():

@@ -29,7 +29,7 @@ def test_rates_equal_the_dense_solution(mobility, law, torque, beads):
 
 
 def growth_matrix(beads, stiffness=1.0, gradient=None, **options):
-    """Linear response of link slopes to link slopes (in the plane x, y) of a straight chain of length 1, μ = 1."""
+    """Linear response of link slopes in the plane x, y of a straight chain of length 1, μ = 1."""
     links, slope = beads - 1, 1e-6
     directions = np.zeros((links, links, 3))
     directions[..., 0] = 1
@@ -67,7 +67,7 @@ def test_explicit_limit_of_the_operator():
 
 @pytest.mark.parametrize(("threshold", "mode"), [(13.14, 1), (53.88, 0)])
 def test_compression_buckles_at_the_thresholds_of_the_chain(threshold, mode):
-    """Growth rate of one more bending mode changes sign at μSL⁴/K; the other growing one is rotation or the first."""
+    """The growth rate of one more bending mode changes sign there; rotation grows at S anyway."""
     gradient = np.diag([-1.0, 1.0, 0.0])
 
     def slowest(number):

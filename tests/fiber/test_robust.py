@@ -1,0 +1,179 @@
+"""Any shape, any stiffness, any batch: finite, exact in length, restartable; bad input refused."""
+
+import numpy as np
+import pytest
+from fiber_cases import WavyFlow, bent, crooked, positions_of, rpy_matrix, run_once_per_step
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gbm_plugin import Fibers, simulate
+from gbm_plugin.fiber import Stepper
+from gbm_plugin.flow import LinearFlow
+
+STILL = LinearFlow(np.zeros((3, 3)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    beads=st.integers(2, 200),
+    relative=st.floats(-3, np.log10(30)),
+    bend=st.floats(0, 2),
+    law=st.sampled_from(["sine", "discreteRod"]),
+    seed=st.integers(0, 2**31),
+)
+def test_any_fiber_stays_finite_and_of_exact_length(beads, relative, bend, law, seed):
+    """l_p/L from 1e-3 to 30, l_p = (K/μS)^(1/4), in a flow of rates S ~ 1."""
+    length, viscosity = 1.0, 1e-3
+    stiffness = viscosity * (10**relative * length) ** 4
+    fibers = Fibers(bent(2, beads, length / beads, bend, seed), stiffness, viscosity, curvature_law=law)
+    stepper = run_once_per_step(fibers, WavyFlow(), 0.02, 4, integrator="implicit")
+    last = stepper.positions
+    assert np.isfinite(last).all()
+    spacing = np.linalg.norm(np.diff(last, axis=1), axis=2)
+    assert np.abs(spacing / (2 * fibers.radius) - 1).max() < 1e-13 * beads
+
+
+@settings(max_examples=30, deadline=None)
+@given(beads=st.integers(2, 12), spread=st.floats(0.1, 3), seed=st.integers(0, 2**31))
+def test_rpy_is_symmetric_positive_definite(beads, spread, seed):
+    """The dense tensors that the kernels are compared with, for random and overlapping beads."""
+    x = spread * np.random.default_rng(seed).standard_normal((beads, 3))
+    matrix = rpy_matrix(x, 0.5, 1.0)
+    assert np.abs(matrix - matrix.T).max() < 1e-14
+    assert np.linalg.eigvalsh(matrix).min() > 0
+
+
+def test_rpy_is_continuous_at_contact_and_free_drain_far_away():
+    def pair(r):
+        return rpy_matrix(np.array([[0, 0, 0], [r, 0.0, 0]]), 1.0, 1.0)
+
+    assert np.abs(pair(2 + 1e-9) - pair(2 - 1e-9)).max() < 1e-9
+    alone = np.diag(np.r_[np.full(6, 1 / (6 * np.pi)), np.full(6, 1 / (8 * np.pi))])
+    for r in (1e2, 1e4):
+        assert np.abs(pair(r) - alone).max() < 1 / (4 * np.pi * r) * 1.01
+
+
+@pytest.mark.parametrize("integrator", ["ab3", "implicit", "auto"])
+def test_restart_is_bitwise(integrator):
+    fibers = Fibers(bent(11, 7, 0.1), 1e-3, 1.0)
+    whole = run_once_per_step(fibers, WavyFlow(), 0.05, 9, integrator=integrator)
+    half = run_once_per_step(fibers, WavyFlow(), 0.05, 5, integrator=integrator)
+    again = Stepper(fibers, integrator=integrator)
+    again.restore(half.state())
+    for _ in range(4):
+        again.advance(0.05)
+        assert not again.provisional
+        again.observe(again.time, *WavyFlow().sample(again.positions, again.time, again.need))
+    assert again.time == whole.time
+    assert (again.positions == whole.positions).all()
+    assert (again.prediction_gap == whole.prediction_gap).all()
+
+
+@pytest.mark.parametrize("integrator", ["ab3", "implicit"])
+def test_results_do_not_depend_on_the_number_of_threads(integrator):
+    import numba
+
+    fibers = Fibers(crooked(40, 7, 0.1), 1e-3, 1e-2)
+    threads, results = numba.get_num_threads(), []
+    try:
+        for count in (1, min(2, threads)):
+            numba.set_num_threads(count)
+            results.append(run_once_per_step(fibers, WavyFlow(), 0.01, 5, integrator=integrator).positions)
+    finally:
+        numba.set_num_threads(threads)
+    assert (results[0] == results[1]).all()
+
+
+GOOD = bent(2, 5, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "message"),
+    [
+        ((GOOD[:, :1], 1.0, 1.0), {}, "at least one fiber of two beads"),
+        ((GOOD * [1, 1, 2], 1.0, 1.0), {}, "must touch"),
+        ((GOOD * np.nan, 1.0, 1.0), {}, "NaN"),
+        ((GOOD[0], 1.0, 1.0), {}, "must be \\(fibers, beads, 3\\)"),
+        ((GOOD, -1.0, 1.0), {}, "not negative"),
+        ((GOOD, [1.0, 2.0, 3.0], 1.0), {}, "must be one number or \\(2,\\)"),
+        ((GOOD, 1.0, 0.0), {}, "viscosity is 0.0; it must be finite and positive"),
+        ((GOOD, 1.0, 1.0), {"bending_torque": "printed"}, "allowed are consistent, asPrinted"),
+        ((GOOD, 1.0, 1.0), {"curvature_law": "tan"}, "allowed are sine, discreteRod"),
+        ((GOOD, 1.0, 1.0), {"young_modulus": 1.0}, "exactly one of them"),
+        ((GOOD, None, 1.0), {}, "exactly one of them"),
+    ],
+)
+def test_bad_fibers_are_refused(arguments, options, message):
+    with pytest.raises(ValueError, match=message):
+        Fibers(*arguments, **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"integrator": "rk4"}, "allowed are ab3, implicit, auto"),
+        ({"mobility": "stokes"}, "allowed are freeDrain, rpy"),
+        ({"strain_coupling": True}, "no effect"),
+        ({"tolerance": 0.0}, "tolerance is 0.0; it must be finite and positive"),
+        ({"record_every": 0}, "record_every is 0"),
+        ({"repulsion": -1.0}, "not negative"),
+    ],
+)
+def test_bad_options_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        simulate(Fibers(GOOD, 1.0, 1.0), STILL, 0.1, 1.0, **options)
+
+
+def test_ab3_refuses_absurd_numbers_of_substeps():
+    with pytest.raises(ValueError, match="take the implicit integrator"):
+        simulate(Fibers(GOOD, 1e9, 1e-3), STILL, 0.1, 1.0, integrator="ab3")
+
+
+def test_the_loop_is_guarded():
+    stepper = Stepper(Fibers(GOOD, 1.0, 1.0))
+    rest = np.zeros(GOOD.shape)
+    with pytest.raises(ValueError, match=r"observe\(\) comes before advance\(\)"):
+        stepper.advance(0.1)
+    with pytest.raises(ValueError, match="the fibers are at time 0"):
+        stepper.observe(1.0, rest, rest)
+    with pytest.raises(ValueError, match="sampled velocity has shape"):
+        stepper.observe(0.0, rest[:1], rest)
+    with pytest.raises(ValueError, match="follows a provisional advance"):
+        stepper.correct()
+
+
+def test_nan_is_an_error_where_it_appears():
+    stepper = Stepper(Fibers(GOOD, 1.0, 1.0))
+    wrong = np.zeros(GOOD.shape)
+    wrong[1, 2, 0] = np.nan
+    with pytest.raises(FloatingPointError, match="fiber 1"):
+        stepper.observe(0.0, wrong, np.zeros(GOOD.shape))
+
+
+@pytest.mark.parametrize("integrator", ["ab3", "implicit", "auto"])
+def test_a_fiber_without_finite_solution_is_named(integrator):
+    huge = np.zeros(GOOD.shape)
+    huge[1] = 1e300 * np.arange(5)[:, None]
+    stepper = Stepper(Fibers(GOOD, 1e-6, 1.0), integrator=integrator)
+    stepper.observe(0.0, huge, np.zeros(GOOD.shape))
+    with pytest.raises(FloatingPointError, match="fiber 1 has no finite solution in step 1"):
+        stepper.advance(0.1)
+
+
+def test_straight_fibers_and_what_is_read_off_them():
+    fibers = Fibers.straight(7, 20, 2.0, None, 1e-3, box=(1.0, 2.0, 3.0), seed=4, young_modulus=3.0)
+    assert fibers.contour_length == pytest.approx(2.0)
+    np.testing.assert_allclose(np.linalg.norm(fibers.end_to_end, axis=1), 1.9)
+    assert np.abs(fibers.curvature).max() < 1e-12
+    np.testing.assert_allclose(fibers.gyration_radius, 0.1 * np.sqrt((20**2 - 1) / 12))
+    np.testing.assert_allclose(fibers.bending_stiffness, 3.0 * np.pi * 0.1**4 / 64)
+    assert (fibers.centres >= 0).all() and (fibers.centres <= [1, 2, 3]).all()
+    assert (fibers.positions == Fibers.straight(7, 20, 2.0, 1.0, 1e-3, box=(1, 2, 3), seed=4).positions).all()
+
+
+def test_curvature_of_a_circle():
+    turn = 0.1 * np.arange(19)
+    links = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)[None]
+    fibers = Fibers(positions_of(links, 0.1), 1.0, 1.0)
+    np.testing.assert_allclose(fibers.curvature, np.sin(0.1) / 0.1)
+    np.testing.assert_allclose(fibers.bending_energy, 18 * 10 * (1 - np.cos(0.1)))

@@ -1,0 +1,53 @@
+"""Analytic flows: conventions of gradient and rotation, and agreement with finite differences."""
+
+import numpy as np
+import pytest
+
+from gbm_plugin.flow import LinearFlow, TaylorGreen
+
+POINTS = np.random.default_rng(0).uniform(-3, 3, (4, 5, 3))
+
+
+def test_simple_shear_fixes_the_convention():
+    """u = (2y, 0, 0): du_x/dy is [0, 1], and the rotation ½∇×u is −1 about z."""
+    shear = LinearFlow([[0, 2, 0], [0, 0, 0], [0, 0, 0]], velocity=(0, 0, 5))
+    velocity, gradient = shear.sample(POINTS, 0.0)
+    np.testing.assert_allclose(
+        velocity, np.stack([2 * POINTS[..., 1], 0 * POINTS[..., 1], 5 + 0 * POINTS[..., 1]], -1)
+    )
+    assert gradient.shape == (4, 5, 3, 3) and (gradient[..., 0, 1] == 2).all()
+    _, rotation = shear.sample(POINTS, 0.0, "rotation")
+    assert (rotation == [0, 0, -1]).all()
+    assert shear.sample(POINTS, 0.0, "velocity")[1] is None
+
+
+@pytest.mark.parametrize(
+    "flow",
+    [TaylorGreen(1.7, 0.6), LinearFlow([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6], [0.7, 0.8, -0.6]], (1, 2, 3))],
+)
+def test_gradient_and_rotation_are_those_of_the_velocity(flow):
+    _, gradient = flow.sample(POINTS, 0.0, "gradient")
+    _, rotation = flow.sample(POINTS, 0.0, "rotation")
+    for j in range(3):
+        h = 1e-6 * np.eye(3)[j]
+        change = flow.sample(POINTS + h, 0.0)[0] - flow.sample(POINTS - h, 0.0)[0]
+        np.testing.assert_allclose(gradient[..., j], change / 2e-6, atol=1e-8)
+    curl = [gradient[..., 2, 1] - gradient[..., 1, 2], gradient[..., 0, 2] - gradient[..., 2, 0]]
+    curl.append(gradient[..., 1, 0] - gradient[..., 0, 1])
+    np.testing.assert_allclose(rotation, 0.5 * np.stack(curl, -1), atol=1e-14)
+
+
+def test_taylor_green_is_equation_12():
+    flow = TaylorGreen(2.0, 3.0)
+    velocity, _ = flow.sample(np.array([0.5, 1.5, 9.0]), 0.0)
+    x, y = np.pi * 0.25, np.pi * 0.75
+    np.testing.assert_allclose(velocity, [3 * np.sin(x) * np.cos(y), -3 * np.cos(x) * np.sin(y), 0])
+
+
+def test_bad_input_is_refused():
+    with pytest.raises(ValueError, match="allowed are velocity, rotation, gradient"):
+        TaylorGreen(1.0, 1.0).sample(POINTS, 0.0, "strain")
+    with pytest.raises(ValueError, match="width must be positive"):
+        TaylorGreen(0.0, 1.0)
+    with pytest.raises(ValueError, match="must be \\(3, 3\\) and \\(3,\\)"):
+        LinearFlow(np.eye(2))
