@@ -17,7 +17,6 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         from .coupling.channel import CouplingError
         from .run import RunError
@@ -117,6 +116,7 @@ def _add_json(sub: argparse.ArgumentParser) -> None:
 def _run(arguments) -> None:
     from .run import run, run_spectral
 
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, until the run has its own way
     if arguments.flow == "openfoam":
         run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
         return

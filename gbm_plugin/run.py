@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -24,7 +25,8 @@ from .output.progress import Progress
 log = logging.getLogger(__name__)
 
 STOPPED = "stopped on request; everything is written: the same command continues"
-GRACE = 10.0  # how long one side may outlive the other before it is ended [s]
+GRACE = 5.0  # how long one side may outlive the other that failed, before it is ended [s]
+FULL = 1 << 20  # a disk with less room may be why OpenFOAM failed [bytes]
 
 
 class RunError(RuntimeError):
@@ -132,7 +134,7 @@ class _Pair:
             self.ended_here.add(process)
             process.terminate()
             try:
-                process.wait(5)
+                process.wait(3)
             except subprocess.TimeoutExpired:  # it hangs, or was stopped
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
@@ -147,7 +149,7 @@ class _Pair:
             self.solver.terminate()
 
     def _watch(self) -> None:
-        """Until both have ended, or one has outlived the other by the grace time."""
+        """Until both have ended, or one has outlived the other for too long."""
         alone_since = None
         with Progress(self.scene, self.start_time) as progress:
             while self.solver.poll() is None or self.daemon.poll() is None:
@@ -157,12 +159,22 @@ class _Pair:
                     continue
                 if alone_since is None:
                     alone_since = time.monotonic()
-                    if self.solver.poll():  # a daemon that waits for a solver need not wait longer
-                        self.ended_here.add(self.daemon)
-                        self.daemon.terminate()
-                elif time.monotonic() - alone_since > GRACE:
+                    failed = (self.solver.poll() or 0) or (self.daemon.poll() or 0)
+                    grace = GRACE if failed else self.scene.coupling.timeout
+                    if failed:
+                        self._dismiss()
+                elif time.monotonic() - alone_since > grace:
                     break
             progress.update()
+
+    def _dismiss(self) -> None:
+        """End at once who would only wait for a partner that does not come."""
+        if self.solver.poll() and self.daemon.poll() is None:  # in a session it merely asks for the end
+            self.ended_here.add(self.daemon)
+            self.daemon.terminate()
+        elif self.stopping and self.solver.poll() is None:
+            self.ended_here.add(self.solver)
+            self.solver.terminate()
 
     def _judge(self) -> None:
         solver, daemon = self.solver.returncode, self.daemon.returncode
@@ -189,6 +201,8 @@ class _Pair:
         if not causes:
             codes = f"{name} ended with exit code {solver}, the daemon with {daemon}"
             causes.append(f"{codes} ({self.solver_log}, {self.daemon_log})")
+        if shutil.disk_usage(self.case).free < FULL:
+            causes.append(f"the disk of {self.case} is full")
         raise RunError("; ".join(causes))
 
 

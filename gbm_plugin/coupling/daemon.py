@@ -65,7 +65,7 @@ def serve(case: Path | str) -> None:
                 raise
             finally:
                 channel.close()
-        log.info("stopped before OpenFOAM came")
+        raise CouplingError("stopped before OpenFOAM came")
 
 
 def _greeted(channel: Channel, listener: Listener) -> tuple[Message, Hello] | None:

@@ -243,7 +243,12 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
         provisional = m.head.flags & message::provisional;
         stop = m.head.flags & message::stop;
 
-        if (!(mag(m.head.time - time_.value()) <= 1e-6*deltaT_))
+        // isfinite first: comparing with NaN would raise SIGFPE
+        if
+        (
+            !std::isfinite(m.head.time)
+         || mag(m.head.time - time_.value()) > 1e-6*deltaT_
+        )
         {
             daemon_->fail
             (
@@ -256,7 +261,13 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
         std::memcpy(positions.begin(), m.payload.data(), size);
         forAll(positions, i)
         {
-            if (!std::isfinite(magSqr(positions[i])))
+            const point& p = positions[i];
+            if
+            (
+                !std::isfinite(p.x())
+             || !std::isfinite(p.y())
+             || !std::isfinite(p.z())
+            )
             {
                 daemon_->fail
                 (

@@ -118,7 +118,7 @@ void Foam::fileConnection::read(message& m, std::uint64_t most)
         {
             fail
             (
-                "the daemon was silent for " + std::to_string(int(timeout_))
+                "the daemon was silent for " + Foam::name(timeout_)
               + " s (entry timeout of constant/fiberProperties)"
             );
         }

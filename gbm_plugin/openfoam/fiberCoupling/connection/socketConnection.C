@@ -160,7 +160,7 @@ void Foam::socketConnection::wait(short events, clock::time_point end)
         {
             fail
             (
-                "the daemon was silent for " + std::to_string(int(timeout_))
+                "the daemon was silent for " + Foam::name(timeout_)
               + " s (entry timeout of constant/fiberProperties)"
             );
         }

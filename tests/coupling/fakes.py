@@ -1,0 +1,257 @@
+"""Either side of the coupling played by the test, against the real other one; and processes to do harm to."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from conftest import start_solver
+from gbm_plugin.case.openfoam import fatal_message
+from gbm_plugin.case.scene import read_scene
+from gbm_plugin.coupling.channel import listen
+from gbm_plugin.coupling.message import Hello, Kind, Message, encode_array, encode_header, encode_welcome
+
+BOX = 2 * np.pi
+PATIENCE = 60  # s, beyond any timeout of these tests
+
+
+def start_gbm(*arguments, **options) -> subprocess.Popen:
+    """The command line in the background, what it says in one pipe."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "gbm_plugin.cli", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        **options,
+    )
+
+
+def until(condition: Callable[[], object], what: str, patience: float = PATIENCE):
+    """Wait for a condition, and give its value back."""
+    end = time.monotonic() + patience
+    while not (value := condition()):
+        assert time.monotonic() < end, f"{what} did not happen within {patience} s"
+        time.sleep(0.002)
+    return value
+
+
+def one_line(process: subprocess.Popen, command: str) -> str:
+    """What a gbm process that failed said in its one line of error."""
+    try:
+        output, _ = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        raise AssertionError(f"gbm {command} did not end") from None
+    assert process.returncode == 1, output
+    assert "Traceback" not in output
+    errors = [line for line in output.splitlines() if line.startswith(f"gbm {command}: ")]
+    assert len(errors) == 1 and output.splitlines()[-1] == errors[0], output
+    return errors[0]
+
+
+class FakeSolver:
+    """OpenFOAM's side against a real `gbm daemon`."""
+
+    def __init__(self, case: Path):
+        self.case = case
+        self.scene = read_scene(case)
+        self.daemon = start_gbm("daemon", case)
+        self.socket: socket.socket | None = None
+
+    def connect(self, **changes) -> None:
+        """The connection and HELLO, with other values where the test wants them."""
+        tcp = self.scene.coupling.transport == "tcp"
+        path = self.case / ("gbm.tcp" if tcp else "gbm.sock")
+        until(lambda: path.exists() or self.daemon.poll() is not None, "the daemon's address")
+        token = ""
+        if tcp:
+            host, port, token = path.read_text().split()
+            self.socket = socket.create_connection((host, int(port)))
+        else:
+            self.socket = socket.socket(socket.AF_UNIX)
+            until(lambda: self.socket.connect_ex(str(path)) == 0, "a connection to the daemon")
+        self.socket.settimeout(PATIENCE)
+        values = {
+            "viscosity": self.scene.viscosity,
+            "time_step": self.scene.time_step,
+            "box_min": (0.0, 0.0, 0.0),
+            "box_max": (BOX, BOX, BOX),
+            "cells": 4096,
+            "folder": "0",
+            "token": token,
+        }
+        hello = Hello(**{**values, **changes}).encode()
+        self.raw(Message(Kind.HELLO, 0, 0.0, hello).encode())
+
+    def raw(self, data: bytes) -> None:
+        self.socket.sendall(data)
+
+    def receive(self) -> Message:
+        def exactly(size: int) -> bytes:
+            data = b""
+            while len(data) < size:
+                part = self.socket.recv(size - len(data))
+                if not part:
+                    raise EOFError
+                data += part
+            return data
+
+        magic, _version, kind, flags, _, step, moment, size = _header(exactly(40))
+        assert magic == b"GBMC"
+        return Message(Kind(kind), step, moment, exactly(size), flags)
+
+    def sample(self, step: int, value: float = 0.1) -> Message:
+        beads = sum(f.count * f.beads for f in self.scene.families)
+        values = np.full(6 * beads, value)
+        return Message(Kind.SAMPLE, step, step * self.scene.time_step, encode_array(values))
+
+    def serve_until(self, step: int) -> None:
+        """A run like any other until the positions of this step are there."""
+        while True:
+            message = self.receive()
+            if message.kind is Kind.POSITIONS:
+                if message.step == step:
+                    return
+                self.raw(self.sample(message.step).encode())
+
+    def last_word(self) -> str:
+        """The daemon's ERROR, which ends the connection."""
+        while (message := self.receive()).kind is not Kind.ERROR:
+            pass
+        return message.payload.decode()
+
+    def close(self) -> None:
+        if self.socket is not None:
+            self.socket.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+        if self.daemon.poll() is None:
+            self.daemon.kill()
+        self.daemon.wait()
+        self.daemon.stdout.close()
+
+
+def _header(data: bytes):
+    import struct
+
+    return struct.unpack("<4sHHIIqdQ", data)
+
+
+def fake_daemon(case: Path, misbehave: Callable) -> str:
+    """pimpleFoam against a daemon that is fine until it calls misbehave(channel, first, beads) in place of sending
+    the positions of step 1. Returns the one line that pimpleFoam ends with."""
+    scene = read_scene(case)
+    beads = sum(f.count * f.beads for f in scene.families)
+    with listen(case, scene.coupling) as listener:
+        solver = start_solver(case)
+        try:
+            channel = listener.accept(lambda: solver.poll() is not None)
+            first = channel.receive()
+            misbehave(channel, first, beads)
+            assert solver.wait(PATIENCE) == 1
+            channel.close()
+        finally:
+            solver.kill()
+            solver.wait()
+    text = fatal_message(case / "log.pimpleFoam")
+    assert text is not None
+    return text
+
+
+def greet(channel, first: Message, beads: int) -> None:
+    """WELCOME, and step 0 as it should be."""
+    channel.send(Message(Kind.WELCOME, first.step, first.time, encode_welcome("rotation", [(beads, 1)])))
+    channel.send(positions(0, beads))
+    channel.receive(1 << 20)
+
+
+def positions(step: int, beads: int, value: float = 1.0, **changes) -> Message:
+    values = {"step": step, "time": 0.02 * step, "payload": encode_array(np.full((beads, 3), value))}
+    return Message(Kind.POSITIONS, **{**values, **changes})
+
+
+def header(message: Message, **fields) -> bytes:
+    """The bytes of a message with single fields of its header replaced."""
+    import struct
+
+    names = ["magic", "version", "kind", "flags", "reserved", "step", "time", "size"]
+    values = dict(zip(names, _header(encode_header(message)), strict=True))
+    return struct.pack("<4sHHIIqdQ", *{**values, **fields}.values()) + message.payload
+
+
+def children(pid: int) -> dict[str, int]:
+    """The solver and the daemon that a `gbm run` has started, by what they are."""
+    found = {}
+    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        try:
+            words = Path(f"/proc/{child}/cmdline").read_text().split("\0")
+        except OSError:
+            continue
+        if "daemon" in words:
+            found["daemon"] = int(child)
+        elif words[0] in ("pimpleFoam", "mpirun"):
+            found["solver"] = int(child)
+    return found
+
+
+class Run:
+    """A `gbm run` in the background."""
+
+    def __init__(self, case: Path, *options: str):
+        self.case = case
+        self.process = start_gbm("run", case, *options)
+
+    def at_step(self, step: int) -> dict[str, int]:
+        """Its two processes, once the daemon has seen this step."""
+        until(lambda: self.process.poll() is not None or last_step(self.case) >= step, f"step {step}")
+        assert self.process.poll() is None, self.process.communicate()[0]
+        return children(self.process.pid)
+
+    def killed_at(self, step: int) -> None:
+        """All three processes gone at once."""
+        both = self.at_step(step)
+        for pid in (*both.values(), self.process.pid):
+            os.kill(pid, signal.SIGKILL)
+        self.process.communicate()
+        for pid in both.values():
+            until(lambda pid=pid: not alive(pid), f"the end of {pid}")
+
+    def line(self) -> str:
+        return one_line(self.process, "run")
+
+
+def kill_all_of(case: Path) -> None:
+    """Whatever a failed test has left at work in its case."""
+    for process in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if str(case) in process.read_text().split("\0"):
+                os.kill(int(process.parent.name), signal.SIGKILL)
+        except OSError:
+            continue
+
+
+def alive(pid: int) -> bool:
+    try:
+        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+
+
+def last_step(case: Path) -> int:
+    """The latest step in the daemon's newest table; -1 without one."""
+    tables = sorted(case.glob("postProcessing/fibers/*/daemon.dat"), key=lambda p: p.stat().st_mtime)
+    rows = re.findall(r"^[\d.e+-]+\t(\d+)\t.*\n", tables[-1].read_text(), re.M) if tables else []
+    return int(rows[-1]) if rows else -1
