@@ -40,6 +40,7 @@ Foam::fv::linearForcing::linearForcing
     nu_(0),
     timeIndex_(-1),
     A_(0),
+    kOld_(0),
     hasOld_(false)
 {
     read(dict);
@@ -292,12 +293,17 @@ void Foam::fv::linearForcing::correct(volVectorField& U)
         flowStatistics::average(U)
     );
 
-    U -= mean;
-
-    surfaceScalarField* phi = mesh_.getObjectPtr<surfaceScalarField>(phiName_);
-    if (phi)
+    // a mean below rounding costs nothing and does no harm
+    if (mag(mean.value()) > SMALL*Foam::sqrt(kOld_))
     {
-        *phi -= (mean & mesh_.Sf());
+        U -= mean;
+
+        surfaceScalarField* phi =
+            mesh_.getObjectPtr<surfaceScalarField>(phiName_);
+        if (phi)
+        {
+            *phi -= (mean & mesh_.Sf());
+        }
     }
 
     if (mesh_.time().writeTime())
