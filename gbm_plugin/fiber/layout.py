@@ -10,14 +10,15 @@ from numba import get_num_threads, njit, prange, set_num_threads
 
 from .simd import LANES, add, add_scaled, cross, dot, load3, scale, splat, store3, subtract, zero3
 
-BEADS_PER_THREAD = 2000  # fewer are not worth a second thread
+BEADS_PER_THREAD = 2000  # fewer bead-steps are not worth a second thread,
+COPYING = 0.05  # and copying a bead is worth so much of a step
 
 
 @contextmanager
-def threads_for(beads: int):
-    """Use as many threads as so many beads are worth."""
+def threads_for(beads: float):
+    """Use as many threads as so many bead-steps are worth."""
     available = get_num_threads()
-    set_num_threads(max(1, min(available, beads // BEADS_PER_THREAD)))
+    set_num_threads(max(1, min(available, int(beads / BEADS_PER_THREAD))))
     try:
         yield
     finally:

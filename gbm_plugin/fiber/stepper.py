@@ -10,7 +10,7 @@ from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .contact import repulsion_velocity
 from .fibers import Fibers, one_of, positive
-from .layout import bead_positions, pack, threads_for
+from .layout import COPYING, bead_positions, pack, threads_for
 from .mobility import MOBILITIES
 from .simd import LANES
 from .strain import with_strain
@@ -102,7 +102,7 @@ class Stepper:
     def positions(self) -> np.ndarray:
         """(F, N, 3) bead centres now, unwrapped."""
         positions = np.empty((self.fibers.count, self.fibers.beads, 3))
-        with threads_for(self._beads):
+        with threads_for(COPYING * self._beads):
             bead_positions(self._state, 2 * self.fibers.radius, positions)
         return positions
 
@@ -126,7 +126,7 @@ class Stepper:
         if self.repulsion:
             push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
             velocity = velocity + push
-        with threads_for(self._beads):
+        with threads_for(COPYING * self._beads):
             self._ambient.observe(time, velocity, extra)
 
     def _field(self, name, values, tail) -> np.ndarray:
