@@ -100,6 +100,13 @@ def _parser() -> argparse.ArgumentParser:
     kind.add_argument("--transport", choices=("socket", "tcp", "file"), default="socket", help="(default: socket)")
     _add_json(kind)
 
+    kind = kinds.add_parser("fibers", help="bead-steps per second of the integrators, and time to an accuracy")
+    kind.set_defaults(action=_bench_fibers)
+    kind.add_argument("--fibers", type=int, default=1000, help="(default: 1000)")
+    kind.add_argument("--beads", type=int, default=20, help="of each fiber (default: 20)")
+    kind.add_argument("--quick", action="store_true", help="without the large batches")
+    _add_json(kind)
+
     kind = kinds.add_parser("spectral", help="a right-hand side of the spectral solver, beside fluidsim if there")
     kind.set_defaults(action=_bench_spectral)
     kind.add_argument("--cells", type=int, default=128, help="in each direction (default: 128)")
@@ -167,6 +174,14 @@ def _bench_coupling(arguments) -> dict:
     sizes = {name: getattr(arguments, name) for name in ("cells", "fibers", "beads", "steps", "transport")}
     result = coupling.run(arguments.case, **sizes)
     print(coupling.table(result))
+    return result
+
+
+def _bench_fibers(arguments) -> dict:
+    from .bench import fibers
+
+    result = fibers.run(arguments.fibers, arguments.beads, quick=arguments.quick)
+    print(fibers.table(result))
     return result
 
 

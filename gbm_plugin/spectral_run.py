@@ -176,7 +176,10 @@ class _Run:
         return self.solver.sample(self.fleet.positions - self.origin, self.solver.time, self.fleet.need)
 
     def _observe(self) -> None:
-        self.fleet.observe(self.fleet.time, *self._sample())
+        velocity, extra = self._sample()
+        self.fleet.observe(self.fleet.time, velocity, extra)
+        if not self.fleet.provisional:
+            self.fleet.check_prediction(velocity, self.step)
 
     def _advance(self) -> None:
         self.solver.advance(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from conftest import DEFAULT_CASE
+
 from gbm_plugin.validate import table, validate
 
 

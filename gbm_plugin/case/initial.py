@@ -74,7 +74,7 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
     if not np.all(np.isfinite(velocity)):
         raise CaseError("the initial velocity is not finite")
     text = template.read_text()
-    head, entry, tail = _split_internal_field(text, template)
+    head, tail = _around_internal_field(text, template)
     cells = velocity.transpose(3, 2, 1, 0).reshape(-1, 3)
     head = _binary_header(head)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -84,11 +84,11 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
         file.write(f")\n;{tail.rstrip()}\n\n{END}\n".encode())
 
 
-def _split_internal_field(text: str, path: Path) -> tuple[str, str, str]:
+def _around_internal_field(text: str, path: Path) -> tuple[str, str]:
     match = re.search(r"^internalField[^;]*;", text, flags=re.MULTILINE)
     if match is None:
         raise CaseError(f"{path}: the entry 'internalField' is missing")
-    return text[: match.start()], match.group(), text[match.end() :]
+    return text[: match.start()], text[match.end() :]
 
 
 def _binary_header(head: str) -> str:

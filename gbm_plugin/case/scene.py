@@ -28,6 +28,7 @@ class Model:
     curvature_law: str = "sine"
     strain_coupling: bool = False
     tolerance: float | None = None
+    repulsion: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,7 @@ def _read_model(d: Dictionary, default: Model) -> Model:
         curvature_law=d.word("curvatureLaw", CURVATURE_LAWS, default.curvature_law),
         strain_coupling=d.switch("strainCoupling", default.strain_coupling),
         tolerance=d.number("tolerance", default.tolerance, above=0),
+        repulsion=d.number("repulsion", default.repulsion, least=0),
     )
     if model.strain_coupling and model.mobility == "freeDrain":
         raise d.fail("strainCoupling", "is yes with mobility freeDrain, where it is nothing; it needs rpy")

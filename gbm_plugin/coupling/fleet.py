@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import os
 import zipfile
 from collections.abc import Sequence
@@ -13,9 +14,14 @@ import numpy as np
 
 from ..case.dictionary import CaseError
 from ..case.scene import Family, Scene
-from ..fiber import Fibers, Stepper
 from ..case.times import STATE_FILE
+from ..fiber import Fibers, Stepper
 from .message import NEEDS
+
+log = logging.getLogger(__name__)
+
+# prediction gap over the rms velocity at the beads: worth a word, and too much to go on with
+GAP_WARNING, GAP_LIMIT = 0.1, 1.0
 
 
 class Fleet:
@@ -56,6 +62,7 @@ class Fleet:
                     mobility=f.model.mobility,
                     strain_coupling=f.model.strain_coupling,
                     tolerance=f.model.tolerance,
+                    repulsion=f.model.repulsion,
                 )
             )
         return cls(scene.families, steppers)
@@ -108,6 +115,24 @@ class Fleet:
     def prediction_gap(self) -> float:
         """Largest rms over a fiber of |predicted - received| ambient velocity [m/s]."""
         return float(max(np.max(s.prediction_gap, initial=0.0) for s in self.steppers))
+
+    def check_prediction(self, velocity: np.ndarray, step: int) -> None:
+        """Compare the prediction gap to the rms of the sampled velocity (B, 3): it is an error that no estimate
+        inside the fibers sees. A word in the log where it is large, CaseError where it is of the flow's order."""
+        rms = float(np.sqrt(3 * np.mean(velocity**2)))
+        gap = self.prediction_gap
+        if gap > GAP_LIMIT * rms > 0:
+            raise CaseError(
+                f"step {step}: the flow at a fiber was predicted with an error of {gap:g} m/s, more than its rms "
+                f"of {rms:g} m/s: the time step is too long for this flow"
+            )
+        if gap > GAP_WARNING * rms > 0:
+            share = 100 * gap / rms
+            log.warning(
+                "step %d: flow predicted with an error of %.0f %% of its rms: a shorter deltaT would be wise",
+                step,
+                share,
+            )
 
     def end_to_end_ratio(self) -> list[float]:
         """<R^2>/L^2 of each family, L = 2a(N - 1) between the end beads' centres."""

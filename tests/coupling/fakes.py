@@ -13,8 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-
 from conftest import start_solver
+
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.coupling.channel import listen
