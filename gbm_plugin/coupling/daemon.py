@@ -233,8 +233,8 @@ class Session:
             if provisional:
                 self.fleet.correct()
                 continue
-            self.fleet.check_prediction(velocity, self.step)
-            gap, ratios = self.fleet.prediction_gap, self.fleet.end_to_end_ratio()
+            gap = self.fleet.check_prediction(velocity, self.step)
+            ratios = self.fleet.end_to_end_ratio()
             self.table.add(self.time, self.step, self.sent_at, self.arrived_at, gap, ratios)
             if folder is not None:
                 self.fleet.save(folder, self.step, self.time)

@@ -116,9 +116,10 @@ class Fleet:
         """Largest rms over a fiber of |predicted - received| ambient velocity [m/s]."""
         return float(max(np.max(s.prediction_gap, initial=0.0) for s in self.steppers))
 
-    def check_prediction(self, velocity: np.ndarray, step: int) -> None:
-        """Compare the prediction gap to the rms of the sampled velocity (B, 3): it is an error that no estimate
-        inside the fibers sees. A word in the log where it is large, CaseError where it is of the flow's order."""
+    def check_prediction(self, velocity: np.ndarray, step: int) -> float:
+        """The prediction gap [m/s], compared to the rms of the sampled velocity (B, 3): it is an error that no
+        estimate inside the fibers sees. A word in the log where it is large, CaseError where it is of the flow's
+        order."""
         rms = float(np.sqrt(3 * np.mean(velocity**2)))
         gap = self.prediction_gap
         if gap > GAP_LIMIT * rms > 0:
@@ -133,6 +134,7 @@ class Fleet:
                 step,
                 share,
             )
+        return gap
 
     def end_to_end_ratio(self) -> list[float]:
         """<R^2>/L^2 of each family, L = 2a(N - 1) between the end beads' centres."""

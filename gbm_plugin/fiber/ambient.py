@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit, prange
 
-from .layout import pack, unpack
+from .layout import COPYING, pack, threads_for
+from .simd import LANES
 
 SAMPLES = 3  # in the polynomial in time
 KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction
@@ -18,6 +20,17 @@ def lagrange_weights(times, time: float) -> np.ndarray:
         for other in np.delete(times, j):
             weights[j] *= (time - other) / (own - other)
     return weights
+
+
+@njit(parallel=True, cache=True)
+def _squared_gap(new, first, second, third, weights, square):
+    """Sum over the rows of a fiber of (new − weighted predictors)², fields in blocks (B, rows, LANES)."""
+    for b in prange(new.shape[0]):
+        for row in range(new.shape[1]):
+            for lane in range(LANES):
+                predicted = weights[0] * first[b, row, lane] + weights[1] * second[b, row, lane]
+                predicted += weights[2] * third[b, row, lane]
+                square[b, lane] += (new[b, row, lane] - predicted) ** 2
 
 
 class Ambient:
@@ -60,11 +73,14 @@ class Ambient:
         if len(self) < 2:
             return np.zeros(self.shape[0])
         before, earlier = self.times[-1 - SAMPLES : -1], self.samples[-1 - SAMPLES : -1]
-        gap = self.samples[-1][0].copy()
-        for weight, sample in zip(lagrange_weights(before, self.times[-1]), earlier, strict=True):
-            gap -= weight * sample[0]
-        gap = unpack(gap, (*self.shape, 3))
-        return np.sqrt((gap**2).sum(axis=2).mean(axis=1))
+        weights = np.zeros(SAMPLES)
+        weights[: len(before)] = lagrange_weights(before, self.times[-1])
+        predictors = [velocity for velocity, _ in earlier] + [earlier[0][0]] * (SAMPLES - len(earlier))
+        new = self.samples[-1][0]
+        square = np.zeros((len(new), LANES))
+        with threads_for(COPYING * self.shape[0] * self.shape[1]):
+            _squared_gap(new, *predictors, weights, square)
+        return np.sqrt(square.reshape(-1)[: self.shape[0]] / self.shape[1])
 
     def state(self) -> dict[str, np.ndarray]:
         """Times and samples, in blocks."""

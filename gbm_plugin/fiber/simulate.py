@@ -76,7 +76,8 @@ def simulate(
                 positions.append(stepper.positions)
             if not last or n < steps:
                 _sample(stepper, flow)
-                worst = max(worst, stepper.prediction_gap.max())
+                if integrator != "ab3":
+                    worst = max(worst, stepper.prediction_gap.max())
         if integrator != "ab3":
             pieces = _pieces(pieces, EXTRAPOLATION * worst * step / pieces / fibers.contour_length, stepper)
     return Trajectory(np.array(times), np.array(positions), stepper.report())
