@@ -27,7 +27,7 @@ from fakes import (
 
 from conftest import gbm, make_case, set_entry, start_solver
 from gbm_plugin.case.openfoam import fatal_message
-from gbm_plugin.coupling.message import Kind, Message, encode_welcome
+from gbm_plugin.coupling.message import Kind, Message
 from gbm_plugin.output.recording import open_recording
 
 TIMEOUT = 1.5
