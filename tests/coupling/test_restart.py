@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import signal
 
 import numpy as np
 import pytest
@@ -115,4 +116,152 @@ def test_killed_at_any_step(kills, make, whole):
         Run(case).killed_at(step)
     run_case(case)
     assert distance(final(case), final(whole())) == 0
+    check_series(case)
+
+
+def test_stopped_on_request_and_continued(make, whole):
+    """Ctrl-C writes at a time of its own; the run goes on from there."""
+    case = make(write_every=1000)
+    run = Run(case)
+    run.at_step(6)
+    run.process.send_signal(signal.SIGINT)
+    assert "stopped on request; everything is written" in run.line()
+    stopped = [p for p in case.glob("0.[0-9]*") if p.is_dir()]
+    assert len(stopped) == 1 and 0.12 <= float(stopped[0].name) < 0.4
+    set_entry(case / "system/controlDict", "writeInterval", "20")
+    done = run_case(case)
+    assert f"continuing from time {stopped[0].name}" in done.stdout
+    assert distance(final(case), final(whole())) == 0
+    check_series(case)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    ["uniform/fibers.npz", "U", "half of U", "half of p"],
+    ids=lambda name: name.replace("/", " "),
+)
+def test_incomplete_time_folder(broken, tmp_path, whole):
+    """Killed between OpenFOAM's write and the fibers', or within OpenFOAM's: the complete time before counts."""
+    case = tmp_path / "case"
+    shutil.copytree(whole(), case, symlinks=True)
+    for folder in ("0.4", "previous"):
+        shutil.rmtree(case / folder, ignore_errors=True)
+    file = case / "0.3" / broken.removeprefix("half of ")
+    if broken.startswith("half"):
+        file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    else:
+        file.unlink()
+    done = run_case(case)
+    line = [text for text in done.stdout.splitlines() if "falling back" in text]
+    assert len(line) == 1 and "time 0.3 is not complete" in line[0] and "falling back to time 0.2" in line[0]
+    assert (case / "previous/1/0.3/phi").is_file()
+    assert f"earlier results are in {case}/previous/1" in done.stdout
+    assert distance(final(case), final(whole())) == 0
+    check_series(case)
+
+
+def test_no_time_folder_is_complete(tmp_path, whole):
+    case = tmp_path / "case"
+    shutil.copytree(whole(), case)
+    for state in case.glob("0.[0-9]*/uniform/fibers.npz"):
+        state.unlink()
+    done = run_case(case)
+    assert "no time folder is complete" in done.stdout and "starting again from time 0" in done.stdout
+    assert {p.name for p in (case / "previous/1").glob("0.[0-9]*")} == {"0.1", "0.2", "0.3", "0.4"}
+    assert distance(final(case), final(whole())) == 0
+    check_series(case)
+
+
+def test_finished_run_begins_afresh_and_is_extended(tmp_path, whole):
+    case = tmp_path / "case"
+    shutil.copytree(whole(), case)
+    first = final(case)
+    done = run_case(case)
+    assert "the run to time 0.4 is complete: starting a new one" in done.stdout
+    kept = case / "previous/1"
+    assert distance(first, final(kept)) == 0 and distance(first, final(case)) == 0
+    with open_recording(kept / "postProcessing/fibers") as recording:
+        assert len(recording.times) == STEPS + 1
+    check_series(case)
+
+    set_entry(case / "system/controlDict", "endTime", "0.5")
+    done = run_case(case)
+    assert "continuing from time 0.4" in done.stdout
+    assert (case / "0.4/U").is_file() and not (case / "previous/2").exists()
+    check_series(case, steps=25)
+
+
+def test_time_step_changed_at_a_restart(tmp_path, whole):
+    """Halved after 0.2: nearer to a run with the half step throughout than the whole step is."""
+    case = tmp_path / "case"
+    shutil.copytree(whole(), case)
+    for time in ("0.3", "0.4"):
+        shutil.rmtree(case / time)
+    control = case / "system/controlDict"
+    set_entry(control, "deltaT", "0.01")
+    set_entry(control, "writeInterval", "10")
+    done = run_case(case)
+    assert "continuing from time 0.2" in done.stdout
+    with open_recording(case / "postProcessing/fibers") as recording:
+        np.testing.assert_allclose(np.diff(recording.times), [0.02] * 10 + [0.01] * 20, atol=1e-12)
+        mixed = recording.families["test"].positions[-1]
+    fine = make_case(tmp_path / "fine", steps=40, time_step=0.01, write_every=40)
+    run_case(fine)
+    with open_recording(fine / "postProcessing/fibers") as recording:
+        reference = recording.families["test"].positions[-1]
+    with open_recording(whole() / "postProcessing/fibers") as recording:
+        coarse = recording.families["test"].positions[-1]
+    assert 0 < np.abs(mixed - reference).max() < np.abs(coarse - reference).max()
+
+
+def test_other_families_are_refused(tmp_path, whole):
+    case = tmp_path / "case"
+    shutil.copytree(whole(), case)
+    shutil.rmtree(case / "0.4")
+    properties = case / "constant/fiberProperties"
+    text = properties.read_text()
+    properties.write_text(text.replace("count 12", "count 13"))
+    done = gbm("run", case)
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    line = done.stderr.splitlines()[-1]
+    assert "0.3/uniform/fibers.npz holds the families" in line and "constant/fiberProperties says" in line
+    assert '"test", 12' in line and '"test", 13' in line and "log.gbmDaemon" in line
+    properties.write_text(text)  # nothing is lost
+    run_case(case)
+    assert distance(final(case), final(whole())) == 0
+    check_series(case)
+
+
+def test_state_that_cannot_be_read(tmp_path, whole):
+    case = tmp_path / "case"
+    shutil.copytree(whole(), case)
+    shutil.rmtree(case / "0.4")
+    state = case / "0.3/uniform/fibers.npz"
+    data = state.read_bytes()
+    for damaged in (b"", data[: len(data) // 2], b"not at all" * 100):
+        state.write_bytes(damaged)
+        done = gbm("run", case)
+        assert done.returncode == 1 and "Traceback" not in done.stderr
+        assert f"the fiber state {state} cannot be read" in done.stderr.splitlines()[-1]
+
+
+def test_other_number_of_ranks_at_each_restart(make, whole):
+    """Serial, two ranks, serial: as the serial run to what the solver tolerances of 1e-12 leave."""
+    case = make()
+    control = case / "system/controlDict"
+    for end, options in (("0.1", ()), ("0.3", ("--parallel",)), ("0.4", ())):
+        set_entry(control, "endTime", end)
+        done = run_case(case, *options)
+        assert end == "0.1" or "continuing from time" in done.stdout
+    assert not list(case.glob("processor*"))
+    assert distance(final(case), final(whole())) < 1e-8
+    check_series(case)
+
+
+def test_parallel_run_killed_and_continued(make, whole):
+    case = make()
+    Run(case, "--parallel").killed_at(12)
+    done = run_case(case, "--parallel")
+    assert "0.2" in done.stdout
+    assert distance(final(case), final(whole())) < 1e-8
     check_series(case)
