@@ -116,7 +116,7 @@ def set_aside(case: Path, after: float, everything: bool) -> Path | None:
     for part in case.glob("postProcessing/*"):
         things += [p for p in _numbered(part) if float(p.name) >= after * (1 - 1e-9)]
     things = [p for p in things if p.exists()]
-    results = [p for p in things if p.name != "0" and not p.name.startswith("log.")]
+    results = [p for p in things if p != case / "0" and not p.name.startswith("log.")]
     if not results:
         return None
     number = 1

@@ -302,6 +302,8 @@ void Foam::fv::linearForcing::correct(volVectorField& U)
             mesh_.getObjectPtr<surfaceScalarField>(phiName_);
         if (phi)
         {
+            // kept before it changes: in the first step nobody has asked for it
+            phi->oldTime();
             *phi -= (mean & mesh_.Sf());
         }
     }
