@@ -23,6 +23,8 @@ def main(argv: list[str] | None = None) -> int:
 
         expected = (ValueError, CouplingError, RunError, OSError, FloatingPointError)
         result = arguments.action(arguments)
+        if result is not None and getattr(arguments, "json", None):
+            Path(arguments.json).write_text(json.dumps(result, indent=2) + "\n")
     except MemoryError as error:
         return _failed(arguments.command, f"not enough memory: {error}")
     except KeyboardInterrupt:
@@ -31,8 +33,6 @@ def main(argv: list[str] | None = None) -> int:
         if not isinstance(error, expected):
             raise
         return _failed(arguments.command, str(error))
-    if result is not None and getattr(arguments, "json", None):
-        Path(arguments.json).write_text(json.dumps(result, indent=2) + "\n")
     return 0
 
 

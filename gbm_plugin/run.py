@@ -21,6 +21,7 @@ from .case.prepare import prepare, ranks_of, reconstruct
 from .case.scene import Scene, read_scene
 from .case.times import choose_start
 from .output.progress import Progress
+from .output.restarts import keep_earlier
 
 log = logging.getLogger(__name__)
 
@@ -100,9 +101,11 @@ class _Pair:
 
     def run(self) -> None:
         # in sessions of their own: Ctrl-C reaches this process alone, which then ends both in order
-        daemon = [sys.executable, "-m", "gbm_plugin.cli", "daemon", str(self.case)]
+        daemon = [sys.executable, "-P", "-m", "gbm_plugin.cli", "daemon", str(self.case)]
         solver = command(self.scene.application, self.case, self.ranks)
         handlers = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
+        for path in (self.daemon_log, self.solver_log):
+            keep_earlier(path)
         try:
             with self.daemon_log.open("w") as d, self.solver_log.open("w") as s:
                 # the cores that the solver leaves; one that they share, if it leaves none

@@ -25,6 +25,7 @@ from .coupling.fleet import Fleet
 from .coupling.steptable import StepTable
 from .output.progress import Progress
 from .output.recording import Recorder
+from .output.restarts import keep_earlier
 from .spectral import EswaranPope, LinearForcing, SpectralSolver
 from .spectral.interpolation import WORDS
 
@@ -108,6 +109,10 @@ class _Run:
         self.scene, self.solver, self.start = scene, solver, start
         origin = np.asarray(scene.origin)
         self.origin = origin
+        folders = [scene.case.parent / name for name in ("0.orig", "0")]
+        self.template = next((f / "U" for f in folders if (f / "U").is_file()), None)
+        if self.template is None:
+            raise CaseError(f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written")
         self.fleet = Fleet.seeded(scene, origin, origin + scene.box, start.time)
         # energy and power before the last step, and at its end
         self.before: tuple[float, float] | None = None
@@ -126,7 +131,7 @@ class _Run:
         scene = self.scene
         fibers = scene.case / "postProcessing/fibers" / name
         self.recorder = Recorder(
-            fibers / "fibers.h5",
+            keep_earlier(fibers / "fibers.h5"),
             [family_record(f) for f in scene.families],
             box_origin=scene.origin,
             box_size=scene.box,
@@ -138,7 +143,7 @@ class _Run:
         self.table = StepTable(fibers, scene.families)
         path = scene.case / "postProcessing/linearForcing" / name / "linearForcing.dat"
         path.parent.mkdir(parents=True, exist_ok=True)
-        self.flow_table = path.open("w", buffering=1)
+        self.flow_table = keep_earlier(path).open("w", buffering=1)
         self.flow_table.write(
             "# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n"
         )
@@ -213,7 +218,7 @@ class _Run:
     def _save(self) -> None:
         """U at the cell centres for whoever reads the folder as a case, then the states, complete with the last."""
         folder = self.scene.case / _name(self.fleet.time)
-        write_velocity(self.scene.case / "../0.orig/U", folder / "U", self.solver.shifted_velocity(0.5))
+        write_velocity(self.template, folder / "U", self.solver.shifted_velocity(0.5))
         path = folder / FLOW_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("wb") as file:

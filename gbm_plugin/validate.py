@@ -41,6 +41,10 @@ def validate(case: Path | str, cells: list[int], time_step: float, seed: int = 1
     take it in proportion to their cells. Velocity: rms difference at the cell centres over the rms velocity.
     Fibers: rms difference of the end beads over the fiber length, for each family. Raises as `run.run`.
     """
+    if len(set(cells)) < len(cells) or any(n < 8 or n % 2 for n in cells):
+        raise ValueError(f"cells are {cells}; allowed: even numbers of at least 8, each once")
+    if not 0 < time_step <= END_TIME / 4:
+        raise ValueError(f"time step is {time_step:g}; allowed: positive, up to {END_TIME / 4:g}")
     rows = []
     with tempfile.TemporaryDirectory(prefix="gbm-validate-") as folder:
         for n in cells:

@@ -127,9 +127,13 @@ class Dictionary:
             raise self.fail(name, f"is '{value}': a dictionary in braces is needed")
         return Dictionary(value, f"{self.where}, {name}")
 
-    def subs(self) -> list[tuple[str, Dictionary]]:
-        """All entries, each of which must be a dictionary."""
-        return [(name, self.sub(name)) for name in self._entries]
+    @property
+    def names(self) -> list[str]:
+        return list(self._entries)
+
+    def subs(self, others: bool = False) -> list[Dictionary]:
+        """All entries, each of which must be a dictionary; with `others`, those that are."""
+        return [self.sub(n) for n, value in self._entries.items() if not others or isinstance(value, dict)]
 
     def done(self) -> None:
         """CaseError where an entry is none of those that were asked for."""

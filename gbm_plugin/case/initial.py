@@ -11,6 +11,7 @@ from .dictionary import CaseError, Dictionary
 from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
 
 END = f"// {73 * '*'} //"  # the last line of what OpenFOAM writes: the file is whole
+NOTE = "made from system/initialFieldDict"
 KINDS = ("random", "modes", "taylorGreen", "ABC")
 
 
@@ -84,6 +85,14 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
         file.write(f")\n;{tail.rstrip()}\n\n{END}\n".encode())
 
 
+def is_made_here(path: Path) -> bool:
+    """Whether a velocity file was written by write_velocity, and by nothing else since."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return NOTE.encode() in file.read(1000)
+
+
 def _around_internal_field(text: str, path: Path) -> tuple[str, str]:
     match = re.search(r"^internalField[^;]*;", text, flags=re.MULTILINE)
     if match is None:
@@ -92,4 +101,5 @@ def _around_internal_field(text: str, path: Path) -> tuple[str, str]:
 
 
 def _binary_header(head: str) -> str:
-    return re.sub(r"(\bformat\s+)\w+;", r'\1binary;\n    arch        "LSB;label=32;scalar=64";', head, count=1)
+    entries = f'\n    arch        "LSB;label=32;scalar=64";\n    note        "{NOTE}";'
+    return re.sub(r"(\bformat\s+)\w+;", rf"\1binary;{entries}", head, count=1)

@@ -20,7 +20,8 @@ def environment() -> dict[str, str]:
     CaseError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
     """
     env = dict(os.environ)
-    if "WM_PROJECT_DIR" not in env:
+    sourced = "WM_PROJECT_DIR" in env and Path(env["WM_PROJECT_DIR"]) != DEBIAN
+    if not sourced:
         if not (DEBIAN / "etc").is_dir():
             raise CaseError(
                 "OpenFOAM is not installed (Debian: the package openfoam), nor is one sourced: run ./Allrun"
@@ -33,10 +34,9 @@ def environment() -> dict[str, str]:
             "(www.openfoam.com names its releases vYYMM)"
         )
     own = Path(__file__).resolve().parents[2] / "build/lib"
-    folders = [Path(env["FOAM_USER_LIBBIN"])] if "FOAM_USER_LIBBIN" in env else []
-    library = next((f for f in [*folders, own] if (f / PLUGIN).is_file()), None)
-    if library is None:
-        raise CaseError(f"the plugin {PLUGIN} is not in {[*folders, own][0]}: build it with ./Allwmake")
+    library = Path(env.get("FOAM_USER_LIBBIN", own)) if sourced else own  # each has its own binary interface
+    if not (library / PLUGIN).is_file():
+        raise CaseError(f"the plugin {PLUGIN} is not in {library}: build it with ./Allwmake")
     env["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, [str(library), env.get("LD_LIBRARY_PATH", "")]))
     env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return env

@@ -104,6 +104,8 @@ def read_scene(case: Path | str) -> Scene:
     case = Path(case)
     if not case.is_dir():
         raise CaseError(f"there is no case folder {case}")
+    if " " in str(case.resolve()):
+        raise CaseError(f"the path of the case, '{case.resolve()}', has a space, which OpenFOAM does not take")
     control = Dictionary.read(case, "system/controlDict")
     if "adjustTimeStep" in control and control.switch("adjustTimeStep"):
         raise control.fail(
@@ -116,7 +118,7 @@ def read_scene(case: Path | str) -> Scene:
     scene = Scene(
         case=case,
         application=control.word("application", default="pimpleFoam"),
-        viscosity=Dictionary.read(case, "constant/transportProperties").number("nu", above=0),
+        viscosity=_read_viscosity(case),
         density=fibers.number("rho", 1.0, above=0),
         time_step=time_step,
         start_time=control.number("startTime", 0.0),
@@ -166,7 +168,7 @@ def _read_model(d: Dictionary, default: Model) -> Model:
 def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:
     model = _read_model(fibers, Model())
     group = fibers.sub("families")
-    families = tuple(_read_family(case, name, d, model) for name, d in group.subs())
+    families = tuple(_read_family(case, name, d, model) for name, d in zip(group.names, group.subs(), strict=True))
     if not families:
         raise fibers.fail("families", "is empty: at least one family of fibers is needed")
     return families
@@ -237,19 +239,28 @@ def _read_coupling(fibers: Dictionary) -> Coupling:
 
 
 def _read_forcing(case: Path) -> Forcing | None:
-    """The forcing that both engines know; other fvOptions are OpenFOAM's own business."""
-    if not (case / "constant/fvOptions").is_file():
+    """The forcing that both engines know; other fvOptions are OpenFOAM's own business.
+
+    As OpenFOAM does, from constant/fvOptions or else system/fvOptions, in a dictionary `options` if there is one.
+    """
+    names = [n for n in ("constant/fvOptions", "system/fvOptions") if (case / n).is_file()]
+    if not names:
         return None
-    options = Dictionary.read(case, "constant/fvOptions")
+    options = Dictionary.read(case, names[0])
+    if "options" in options:
+        options = options.sub("options")
     forcing = None
-    for _name, d in options.subs():
+    for d in options.subs(others=True):
         kind = d.word("type")
-        if not d.switch("active", True) or kind not in ("linearForcing", "eswaranPope"):
+        if kind not in ("linearForcing", "eswaranPope") or not d.switch("active", True):
             continue
         if forcing is not None:
             raise CaseError(f"{options.where}: more than one active forcing")
         coeffs = d.sub(f"{kind}Coeffs") if f"{kind}Coeffs" in d else d
+        for entry in ("type", "active", "U", "phi", "libs"):
+            coeffs.raw(entry, None)
         forcing = _linear_forcing(coeffs) if kind == "linearForcing" else _eswaran_pope(coeffs)
+        coeffs.done()
     return forcing
 
 
@@ -264,24 +275,36 @@ def _eswaran_pope(d: Dictionary) -> Forcing:
     return Forcing("eswaranPope", {**values, "seed": d.integer("seed", 1, least=0)})
 
 
+def _read_viscosity(case: Path) -> float:
+    """nu of a Newtonian fluid."""
+    transport = Dictionary.read(case, "constant/transportProperties")
+    transport.word("transportModel", ("Newtonian",), "Newtonian")
+    return transport.number("nu", above=0)
+
+
+# corners of a box in blockMesh's order
+_CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+
+
 def _read_box(case: Path) -> tuple:
-    """Size, origin and cells of a box of one uniform block in system/blockMeshDict; None each otherwise."""
+    """Size, origin and cells of a box of one block of equal cells in system/blockMeshDict; None each otherwise."""
     nothing = (None, None, None)
     if not (case / "system/blockMeshDict").is_file():
         return nothing
     d = Dictionary.read(case, "system/blockMeshDict")
     try:
         scale = d.number("convertToMeters", d.number("scale", 1.0))
-        vertices = [[float(x) * scale for x in v] for v in d.raw("vertices")]
-        blocks = d.raw("blocks")
-        cells = tuple(int(n) for n in blocks[2])
-        if len(vertices) != 8 or len(blocks) != 5 or len(cells) != 3:
+        vertices = np.array([list(v) for v in d.raw("vertices")], dtype=float) * scale
+        _, corners, cells, grading, ratios = d.raw("blocks")
+        low, size = vertices.min(axis=0), np.ptp(vertices, axis=0)
+        box = vertices.shape == (8, 3) and np.allclose(vertices, low + size * _CORNERS, atol=1e-9 * size.max())
+        equal = grading == "simpleGrading" and [float(r) for r in ratios] == [1, 1, 1]
+        if not box or not equal or [int(c) for c in corners] != list(range(8)):
             return nothing
-    except (TypeError, ValueError, IndexError, KeyError):
+        nx, ny, nz = (int(n) for n in cells)
+    except (TypeError, ValueError):
         return nothing
-    low = tuple(min(v[i] for v in vertices) for i in range(3))
-    high = tuple(max(v[i] for v in vertices) for i in range(3))
-    return tuple(h - o for h, o in zip(high, low, strict=True)), low, cells
+    return tuple(size.tolist()), tuple(low.tolist()), (nx, ny, nz)
 
 
 def _texts(case: Path) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,13 +24,7 @@ def time_folders(case: Path) -> dict[float, str]:
     names = list(SolutionDirectory(str(case), archive=None, paraviewLink=False).getTimes())
     if (case / "processor0").is_dir():
         names += [p.name for p in (case / "processor0").iterdir() if p.is_dir()]
-    found = {}
-    for name in names:
-        try:
-            found[float(name)] = name
-        except ValueError:
-            continue
-    return found
+    return {time: name for name in names if (time := as_time(name)) is not None}
 
 
 def is_complete(case: Path, name: str) -> bool:
@@ -101,11 +96,11 @@ def _has_fibers(case: Path) -> bool:
     return any(case.glob("postProcessing/fibers/*/fibers*.h5"))
 
 
-def set_aside(case: Path, after: float, everything: bool) -> Path | None:
+def set_aside(case: Path, after: float, everything: bool) -> None:
     """Move what a start at time `after` would overwrite to `previous/<n>`: later time folders, function
     objects' output that starts there or later, logs; with `everything` also the start time's own folder and
     the report. Nothing is moved where nothing is there."""
-    things = [p for p in case.glob("log.*") if p.name not in ("log.gbm",)]
+    things = list(case.glob("log.*"))
     if everything:
         things += [case / "report", *case.glob("processor[0-9]*")]
         if (case / "0.orig").is_dir():
@@ -114,11 +109,15 @@ def set_aside(case: Path, after: float, everything: bool) -> Path | None:
     for folder in folders:
         things += [p for p in _numbered(folder) if float(p.name) > after and p not in things]
     for part in case.glob("postProcessing/*"):
-        things += [p for p in _numbered(part) if float(p.name) >= after * (1 - 1e-9)]
+        things += [p for p in _numbered(part) if float(p.name) >= after - 1e-9 * abs(after)]
     things = [p for p in things if p.exists()]
     results = [p for p in things if p != case / "0" and not p.name.startswith("log.")]
-    if not results:
-        return None
+    if results:
+        move_aside(case, things)
+
+
+def move_aside(case: Path, things: list[Path]) -> None:
+    """Move files and folders of the case to a new `previous/<n>`, where they keep their places."""
     number = 1
     while (target := case / PREVIOUS / str(number)).exists():
         number += 1
@@ -130,16 +129,18 @@ def set_aside(case: Path, after: float, everything: bool) -> Path | None:
         except OSError as error:
             raise CaseError(f"cannot move {thing} to {place}: {error.strerror}") from None
     log.info("earlier results are in %s", target)
-    return target
 
 
 def _numbered(folder: Path) -> list[Path]:
-    found = []
-    for p in folder.iterdir() if folder.is_dir() else ():
-        try:
-            float(p.name)
-        except ValueError:
-            continue
-        if p.is_dir():
-            found.append(p)
-    return found
+    """Folders whose name is a time."""
+    children = folder.iterdir() if folder.is_dir() else ()
+    return [p for p in children if p.is_dir() and as_time(p.name) is not None]
+
+
+def as_time(name: str) -> float | None:
+    """The time that a folder's name says; None for other names."""
+    try:
+        time = float(name)
+    except ValueError:
+        return None
+    return time if math.isfinite(time) else None

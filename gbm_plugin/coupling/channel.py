@@ -74,10 +74,10 @@ class Listener(ABC):
         self.close()
 
 
-def listen(case: Path, coupling: Coupling) -> Listener:
-    """Open the way that the case's word `transport` names."""
+def listen(case: Path, coupling: Coupling, log: Path) -> Listener:
+    """Open the way that the case's word `transport` names; log: the solver's, for messages."""
     from .files import FileListener
     from .sockets import TcpListener, UnixListener
 
     kinds = {"socket": UnixListener, "tcp": TcpListener, "file": FileListener}
-    return kinds[coupling.transport](case, coupling)
+    return kinds[coupling.transport](case, coupling, log)

@@ -22,6 +22,7 @@ from ..case.lock import DAEMON, locked
 from ..case.scene import Family, Scene, read_scene
 from ..case.times import STATE_FILE
 from ..output.recording import FamilyRecord, Recorder
+from ..output.restarts import keep_earlier
 from .channel import Channel, CouplingError, Listener, listen
 from .fleet import Fleet
 from .message import (
@@ -51,7 +52,7 @@ def serve(case: Path | str) -> None:
     case = Path(case).resolve()
     scene = read_scene(case)
     stop = _StopFlag()
-    with locked(case, DAEMON), listen(case, scene.coupling) as listener:
+    with locked(case, DAEMON), listen(case, scene.coupling, case / f"log.{scene.application}") as listener:
         log.info("waiting for OpenFOAM (%s)", scene.coupling.transport)
         while (channel := listener.accept(give_up=lambda: bool(stop))) is not None:
             try:
@@ -168,11 +169,11 @@ class Session:
         fleet = Fleet.seeded(self.scene, hello.box_min, hello.box_max, self.time)
         folder = find_state(self.scene.case, hello.folder)
         if folder is None:
-            others = states(self.scene.case)
-            if others and max(others) > 0 and self.time > 0:
+            earlier = sorted(t for t in states(self.scene.case) if t < self.time)
+            if earlier:
                 raise CaseError(
                     f"time {self.time:g} has no complete fiber state (killed while writing?); there are "
-                    f"states at {', '.join(f'{t:g}' for t in sorted(others))}: start from one of these "
+                    f"states at {', '.join(f'{t:g}' for t in earlier)}: start from one of these "
                     "('gbm run' does), or remove them all to begin with new fibers"
                 )
             log.info("time %g: %d beads of new fibers", self.time, fleet.beads)
@@ -186,13 +187,8 @@ class Session:
 
     def _recorder(self, hello: Hello, start: float) -> Recorder:
         folder = self.scene.case / "postProcessing/fibers" / Path(hello.folder).name
-        path = folder / "fibers.h5"
-        number = 1
-        while path.exists():  # an earlier attempt from the same start
-            number += 1
-            path = folder / f"fibers_{number}.h5"
         return Recorder(
-            path,
+            keep_earlier(folder / "fibers.h5"),
             [family_record(f) for f in self.scene.families],
             box_origin=hello.box_min,
             box_size=np.subtract(hello.box_max, hello.box_min),

@@ -77,8 +77,8 @@ class FileChannel(Channel):
 class FileListener(Listener):
     """Owns `exchange`: a new session word tells messages of this run from stale ones, which it removes."""
 
-    def __init__(self, case: Path, coupling: Coupling):
-        self.case = case
+    def __init__(self, case: Path, coupling: Coupling, log: Path):
+        self.log = log
         self.timeout = coupling.timeout
         self.folder = case / "exchange"
         self.session = secrets.token_hex(8)
@@ -92,7 +92,7 @@ class FileListener(Listener):
         write_secret(self.folder / "session", self.session + "\n")
 
     def accept(self, give_up: Callable[[], bool]) -> Channel | None:
-        channel = FileChannel(self.folder, self.session, self.timeout, self.case / "log.pimpleFoam")
+        channel = FileChannel(self.folder, self.session, self.timeout, self.log)
         while not give_up():
             if channel.incoming().exists():
                 return channel

@@ -99,8 +99,8 @@ class SocketListener(Listener):
 
     server: socket.socket
 
-    def __init__(self, case: Path, coupling: Coupling):
-        self.case = case
+    def __init__(self, case: Path, coupling: Coupling, log: Path):
+        self.log = log
         self.timeout = coupling.timeout
 
     def accept(self, give_up: Callable[[], bool]) -> Channel | None:
@@ -108,15 +108,15 @@ class SocketListener(Listener):
         while not give_up():
             with contextlib.suppress(TimeoutError):
                 connection, _ = self.server.accept()
-                return SocketChannel(connection, self.server, self.timeout, self.case / "log.pimpleFoam")
+                return SocketChannel(connection, self.server, self.timeout, self.log)
         return None
 
 
 class UnixListener(SocketListener):
     """`gbm.sock` in the case, mode 0600."""
 
-    def __init__(self, case: Path, coupling: Coupling):
-        super().__init__(case, coupling)
+    def __init__(self, case: Path, coupling: Coupling, log: Path):
+        super().__init__(case, coupling, log)
         # through the folder's descriptor: a socket's path holds 107 characters, and a case may lie deeper
         self._folder = os.open(case, os.O_PATH | os.O_DIRECTORY)
         address = f"/proc/self/fd/{self._folder}/gbm.sock"
@@ -154,8 +154,8 @@ class UnixListener(SocketListener):
 class TcpListener(SocketListener):
     """A port, by default on the loopback address, named with a secret in `gbm.tcp`, mode 0600."""
 
-    def __init__(self, case: Path, coupling: Coupling):
-        super().__init__(case, coupling)
+    def __init__(self, case: Path, coupling: Coupling, log: Path):
+        super().__init__(case, coupling, log)
         self.token = secrets.token_hex(16)
         self.path = case / "gbm.tcp"
         try:

@@ -13,6 +13,16 @@ from numpy.typing import NDArray
 _SAME_TIME = 1e-3
 
 
+def keep_earlier(path: Path) -> Path:
+    """Give a file that is already there a number (``name.1``, ...), so that its name is free; returns path."""
+    number = 1
+    while (kept := path.with_name(f"{path.name}.{number}")).exists():
+        number += 1
+    if path.exists():
+        path.rename(kept)
+    return path
+
+
 def files_by_start(folder: Path | str, name: str) -> list[Path]:
     """The files ``<folder>/<start time>/<name>``, by increasing start time."""
     found = []

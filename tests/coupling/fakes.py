@@ -155,7 +155,7 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
     the positions of step 1. Returns the one line that pimpleFoam ends with."""
     scene = read_scene(case)
     beads = sum(f.count * f.beads for f in scene.families)
-    with listen(case, scene.coupling) as listener:
+    with listen(case, scene.coupling, case / "log.pimpleFoam") as listener:
         solver = start_solver(case)
         try:
             channel = listener.accept(lambda: solver.poll() is not None)

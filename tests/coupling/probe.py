@@ -26,7 +26,7 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
     samples = {}
     solver = start_solver(case, ranks)
     try:
-        with listen(case, scene.coupling) as listener:
+        with listen(case, scene.coupling, case / "log.pimpleFoam") as listener:
             channel = listener.accept(lambda: solver.poll() is not None)
             assert channel is not None, (case / "log.pimpleFoam").read_text()[-3000:]
             first = channel.receive()

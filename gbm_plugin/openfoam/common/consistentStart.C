@@ -28,8 +28,15 @@ void Foam::consistentStart
 
     if (phi)
     {
-        IOobject file(phiName, mesh.time().timeName(), mesh);
-        file.readOpt() = IOobject::MUST_READ;
+        IOobject file
+        (
+            phiName,
+            mesh.time().timeName(),
+            mesh,
+            IOobject::MUST_READ,
+            IOobject::NO_WRITE,
+            false
+        );
 
         if (!file.typeHeaderOk<surfaceScalarField>(false))
         {

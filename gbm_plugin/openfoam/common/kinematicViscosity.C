@@ -7,6 +7,17 @@ Foam::scalar Foam::kinematicViscosity(const objectRegistry& mesh)
     const dictionary& transport =
         mesh.lookupObject<IOdictionary>("transportProperties");
 
+    const word model =
+        transport.lookupOrDefault<word>("transportModel", "Newtonian");
+
+    if (model != "Newtonian")
+    {
+        FatalIOErrorInFunction(transport)
+            << "transportModel '" << model
+            << "': fibers and statistics need a Newtonian fluid"
+            << exit(FatalIOError);
+    }
+
     const dimensionedScalar nu("nu", dimViscosity, transport);
 
     if (nu.value() <= 0)

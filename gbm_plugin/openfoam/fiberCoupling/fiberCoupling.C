@@ -1,6 +1,7 @@
 #include "fiberCoupling.H"
 #include "allowedEntries.H"
 #include "consistentStart.H"
+#include "keepEarlier.H"
 #include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvc.H"
@@ -105,6 +106,7 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
 
     if (Pstream::master())
     {
+        keepEarlier(baseTimeDir()/"coupling.dat");
         resetFile("coupling");
         writeHeader(file(), "Fiber coupling: seconds per step");
         writeCommented(file(), "Time");

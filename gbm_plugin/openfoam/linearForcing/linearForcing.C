@@ -1,6 +1,7 @@
 #include "linearForcing.H"
 #include "allowedEntries.H"
 #include "consistentStart.H"
+#include "keepEarlier.H"
 #include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvMatrices.H"
@@ -52,6 +53,7 @@ Foam::fv::linearForcing::linearForcing
     if (Pstream::master())
     {
         writePrecision_ = 12;
+        keepEarlier(baseTimeDir()/(name + ".dat"));
         resetFile(name);
         writeFile::writeHeader(file(), "Linear forcing, SI units, per unit mass");
         writeCommented(file(), "Time");

@@ -1,4 +1,11 @@
 #include "message.H"
+#include "scalar.H"
+
+static_assert
+(
+    sizeof(Foam::scalar) == 8,
+    "the protocol is in double precision"
+);
 
 static_assert
 (
