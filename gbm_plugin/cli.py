@@ -43,7 +43,9 @@ def _failed(command: str, problem: str) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="gbm", description="Long flexible fibers in turbulence, in OpenFOAM.")
+    parser = argparse.ArgumentParser(
+        prog="gbm", description="Long flexible fibers in turbulence, in OpenFOAM."
+    )
     parser.add_argument("--version", action="version", version=f"gbm {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
@@ -58,7 +60,9 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("run", _run, "Run a case: flow and fibers, continuing an unfinished run.")
     add_case(sub)
     sub.add_argument("--parallel", action="store_true", help="on the MPI ranks of system/decomposeParDict")
-    sub.add_argument("--fresh", action="store_true", help="from the beginning; earlier results go to previous/<n>")
+    sub.add_argument(
+        "--fresh", action="store_true", help="from the beginning; earlier results go to previous/<n>"
+    )
 
     sub.add_argument(
         "--flow",
@@ -67,8 +71,12 @@ def _parser() -> argparse.ArgumentParser:
         help="what solves the flow: OpenFOAM, or the pseudo-spectral solver, whose results go to CASE/spectral",
     )
     sub.add_argument("--threads", type=int, default=1, help="of the spectral solver (default: 1)")
-    sub.add_argument("--precision", choices=("double", "single"), default="double", help="of the spectral solver")
-    sub.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="of the spectral solver; gpu needs CuPy")
+    sub.add_argument(
+        "--precision", choices=("double", "single"), default="double", help="of the spectral solver"
+    )
+    sub.add_argument(
+        "--device", choices=("cpu", "gpu"), default="cpu", help="of the spectral solver; gpu needs CuPy"
+    )
 
     sub = add("daemon", _daemon, "Move the fibers of a case for a solver that is started by hand.")
     add_case(sub)
@@ -83,8 +91,12 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("validate", _validate, "Converge OpenFOAM with a case's schemes to the spectral solver.")
     add_case(sub)
     sub.add_argument("--cells", type=int, nargs="+", default=[24, 32, 48, 64], help="(default: 24 32 48 64)")
-    sub.add_argument("--time-step", type=float, default=0.04, help="of the first, in proportion for the others [s]")
-    sub.add_argument("--figure", metavar="PNG", help="also draw the errors against cells and against time spent")
+    sub.add_argument(
+        "--time-step", type=float, default=0.04, help="of the first, in proportion for the others [s]"
+    )
+    sub.add_argument(
+        "--figure", metavar="PNG", help="also draw the errors against cells and against time spent"
+    )
     _add_json(sub)
 
     sub = add("bench", None, "Measure speed beside error; ratios within one run.")
@@ -97,21 +109,29 @@ def _parser() -> argparse.ArgumentParser:
     kind.add_argument("--fibers", type=int, default=1000, help="(default: 1000)")
     kind.add_argument("--beads", type=int, default=20, help="of each fiber (default: 20)")
     kind.add_argument("--steps", type=int, default=30, help="(default: 30)")
-    kind.add_argument("--transport", choices=("socket", "tcp", "file"), default="socket", help="(default: socket)")
+    kind.add_argument(
+        "--transport", choices=("socket", "tcp", "file"), default="socket", help="(default: socket)"
+    )
     _add_json(kind)
 
-    kind = kinds.add_parser("fibers", help="bead-steps per second of the integrators, and time to an accuracy")
+    kind = kinds.add_parser(
+        "fibers", help="bead-steps per second of the integrators, and time to an accuracy"
+    )
     kind.set_defaults(action=_bench_fibers)
     kind.add_argument("--fibers", type=int, default=1000, help="(default: 1000)")
     kind.add_argument("--beads", type=int, default=20, help="of each fiber (default: 20)")
     kind.add_argument("--quick", action="store_true", help="without the large batches")
     _add_json(kind)
 
-    kind = kinds.add_parser("spectral", help="a right-hand side of the spectral solver, beside fluidsim if there")
+    kind = kinds.add_parser(
+        "spectral", help="a right-hand side of the spectral solver, beside fluidsim if there"
+    )
     kind.set_defaults(action=_bench_spectral)
     kind.add_argument("--cells", type=int, default=128, help="in each direction (default: 128)")
     kind.add_argument("--threads", type=int, default=1, help="(default: 1)")
-    kind.add_argument("--fluidsim", metavar="PYTHON", default=sys.executable, help="interpreter that has fluidsim")
+    kind.add_argument(
+        "--fluidsim", metavar="PYTHON", default=sys.executable, help="interpreter that has fluidsim"
+    )
     _add_json(kind)
     return parser
 

@@ -210,5 +210,7 @@ class _Pair:
 
 
 def _last_error(path: Path) -> str | None:
-    lines = [line for line in path.read_text(errors="replace").splitlines() if line.startswith("gbm daemon: ")]
+    lines = [
+        line for line in path.read_text(errors="replace").splitlines() if line.startswith("gbm daemon: ")
+    ]
     return lines[-1].removeprefix("gbm daemon: ") if lines else None

@@ -112,7 +112,9 @@ class _Run:
         folders = [scene.case.parent / name for name in ("0.orig", "0")]
         self.template = next((f / "U" for f in folders if (f / "U").is_file()), None)
         if self.template is None:
-            raise CaseError(f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written")
+            raise CaseError(
+                f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written"
+            )
         self.fleet = Fleet.seeded(scene, origin, origin + scene.box, start.time)
         # energy and power before the last step, and at its end
         self.before: tuple[float, float] | None = None

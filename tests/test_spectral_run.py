@@ -108,7 +108,10 @@ def test_the_papers_forcing_is_the_spectral_solvers(tmp_path):
     assert np.abs(runs[0]["power"]).max() > 0
     done = gbm("run", path)
     assert done.returncode == 1
-    assert "eswaranPope is a forcing of the spectral solver" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert (
+        "eswaranPope is a forcing of the spectral solver" in done.stderr
+        and len(done.stderr.splitlines()) == 1
+    )
 
 
 def test_a_gpu_that_is_not_there_is_named(tmp_path):

@@ -105,7 +105,9 @@ def read_scene(case: Path | str) -> Scene:
     if not case.is_dir():
         raise CaseError(f"there is no case folder {case}")
     if " " in str(case.resolve()):
-        raise CaseError(f"the path of the case, '{case.resolve()}', has a space, which OpenFOAM does not take")
+        raise CaseError(
+            f"the path of the case, '{case.resolve()}', has a space, which OpenFOAM does not take"
+        )
     control = Dictionary.read(case, "system/controlDict")
     if "adjustTimeStep" in control and control.switch("adjustTimeStep"):
         raise control.fail(
@@ -168,7 +170,9 @@ def _read_model(d: Dictionary, default: Model) -> Model:
 def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:
     model = _read_model(fibers, Model())
     group = fibers.sub("families")
-    families = tuple(_read_family(case, name, d, model) for name, d in zip(group.names, group.subs(), strict=True))
+    families = tuple(
+        _read_family(case, name, d, model) for name, d in zip(group.names, group.subs(), strict=True)
+    )
     if not families:
         raise fibers.fail("families", "is empty: at least one family of fibers is needed")
     return families
@@ -197,9 +201,13 @@ def _read_positions(case: Path, d: Dictionary) -> np.ndarray:
     try:
         positions = np.load(path, allow_pickle=False).astype(float)
     except (OSError, ValueError) as error:
-        raise d.fail("positions", f"names {path}, which cannot be read as a NumPy .npy file: {error}") from None
+        raise d.fail(
+            "positions", f"names {path}, which cannot be read as a NumPy .npy file: {error}"
+        ) from None
     if positions.ndim != 3 or positions.shape[1] < 2 or positions.shape[2] != 3:
-        raise d.fail("positions", f"has shape {positions.shape}; (fibers, beads, 3) with 2 beads or more is needed")
+        raise d.fail(
+            "positions", f"has shape {positions.shape}; (fibers, beads, 3) with 2 beads or more is needed"
+        )
     return positions
 
 
@@ -297,7 +305,9 @@ def _read_box(case: Path) -> tuple:
         vertices = np.array([list(v) for v in d.raw("vertices")], dtype=float) * scale
         _, corners, cells, grading, ratios = d.raw("blocks")
         low, size = vertices.min(axis=0), np.ptp(vertices, axis=0)
-        box = vertices.shape == (8, 3) and np.allclose(vertices, low + size * _CORNERS, atol=1e-9 * size.max())
+        box = vertices.shape == (8, 3) and np.allclose(
+            vertices, low + size * _CORNERS, atol=1e-9 * size.max()
+        )
         equal = grading == "simpleGrading" and [float(r) for r in ratios] == [1, 1, 1]
         if not box or not equal or [int(c) for c in corners] != list(range(8)):
             return nothing

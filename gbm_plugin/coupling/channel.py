@@ -19,6 +19,7 @@ class Channel(ABC):
 
     def __init__(self, timeout: float, log: Path):
         self.timeout = timeout
+        self.greeted = False  # the other side has shown that it is the solver of this case
         self._log = log
 
     @abstractmethod

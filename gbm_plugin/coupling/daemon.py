@@ -42,6 +42,8 @@ from .steptable import StepTable
 
 log = logging.getLogger(__name__)
 
+HELLO_TIMEOUT = 5.0  # a solver says HELLO at once [s]
+
 
 def serve(case: Path | str) -> None:
     """Serve one run of the solver in `case`, then return.
@@ -69,6 +71,7 @@ def serve(case: Path | str) -> None:
 
 def _greeted(channel: Channel, listener: Listener) -> tuple[Message, Hello] | None:
     """The HELLO of the solver; None for a stranger, of whom a port that others can reach must not die."""
+    timeout, channel.timeout = channel.timeout, min(channel.timeout, HELLO_TIMEOUT)
     try:
         message = channel.receive()
         if message.kind is not Kind.HELLO:
@@ -85,6 +88,7 @@ def _greeted(channel: Channel, listener: Listener) -> tuple[Message, Hello] | No
         log.warning("refused a connection: %s", error)
         _say_why(channel, str(error))
         return None
+    channel.timeout, channel.greeted = timeout, True
     return message, hello
 
 

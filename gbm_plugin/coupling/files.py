@@ -43,7 +43,9 @@ class FileChannel(Channel):
         self._data = self._next_file(HEADER_SIZE + max(most, MAX_TEXT))
         message = super().receive(most)
         if self._data:
-            raise self.error(f"{message.kind.name} of step {message.step} is followed by {len(self._data)} bytes")
+            raise self.error(
+                f"{message.kind.name} of step {message.step} is followed by {len(self._data)} bytes"
+            )
         return message
 
     def _next_file(self, most: int) -> bytes:

@@ -178,7 +178,9 @@ class Fleet:
                     )
                 for family, stepper in zip(self.families, self.steppers, strict=True):
                     prefix = f"{family.name}/"
-                    stepper.restore({k.removeprefix(prefix): data[k] for k in data.files if k.startswith(prefix)})
+                    stepper.restore(
+                        {k.removeprefix(prefix): data[k] for k in data.files if k.startswith(prefix)}
+                    )
         except CaseError:
             raise
         except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:

@@ -108,7 +108,9 @@ class Hello:
             token = payload[size + length :].decode()
         except UnicodeDecodeError:
             raise ProtocolError("HELLO holds a token that is not UTF-8") from None
-        return cls(values[0], values[1], tuple(values[2:5]), tuple(values[5:8]), int(values[8]), folder, token)
+        return cls(
+            values[0], values[1], tuple(values[2:5]), tuple(values[5:8]), int(values[8]), folder, token
+        )
 
 
 def decode_folder(data: bytes) -> str:

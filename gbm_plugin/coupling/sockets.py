@@ -27,10 +27,12 @@ class SocketChannel(Channel):
         self._socket.setblocking(False)
 
     def _wait(self, event: int, deadline: float) -> None:
-        """Until the socket is ready; a second solver that knocks meanwhile is told so."""
+        """Until the socket is ready; a second solver that knocks meanwhile is told so. While this one has not
+        said HELLO it may be a stranger, and the next one, who waits, the solver."""
         poll = select.poll()
         poll.register(self._socket, event)
-        poll.register(self._server, select.POLLIN)
+        if self.greeted:
+            poll.register(self._server, select.POLLIN)
         while True:
             left = deadline - time.monotonic()
             if left <= 0:

@@ -92,7 +92,9 @@ def convergence_figure(rows: list[dict]) -> Figure:
         left.loglog(cells, errors, label=name.removesuffix("_error"), **style)
         right.loglog(seconds, errors, **style)
     largest = max(rows[0][name] for name in names)
-    left.loglog(cells, 1.3 * largest * (cells[0] / cells) ** 2, color="0.5", linewidth=1, label="second order")
+    left.loglog(
+        cells, 1.3 * largest * (cells[0] / cells) ** 2, color="0.5", linewidth=1, label="second order"
+    )
     left.set(xlabel="cells per edge", ylabel="error against the spectral solver")
     left.set_xticks(cells, [str(n) for n in cells])
     left.minorticks_off()

@@ -52,7 +52,9 @@ def test_no_divergence_and_no_mean():
 def test_same_field_on_every_lattice():
     """Every second node of 24 is a node of 12."""
     modes = random_modes(peaked_spectrum(0.5, 2, 4), seed=7)
-    np.testing.assert_allclose(modes.on_lattice((24,) * 3)[:, ::2, ::2, ::2], modes.on_lattice((12,) * 3), atol=1e-13)
+    np.testing.assert_allclose(
+        modes.on_lattice((24,) * 3)[:, ::2, ::2, ::2], modes.on_lattice((12,) * 3), atol=1e-13
+    )
 
 
 def test_peaked_spectrum_has_its_sum_and_its_peak():
@@ -65,7 +67,11 @@ def test_taylor_green():
     x = points((8, 8, 8), 0.5)
     u = taylor_green(1.5).on_lattice((8, 8, 8), 0.5)
     sin, cos = np.sin(x), np.cos(x)
-    expected = [sin[..., 0] * cos[..., 1] * cos[..., 2], -cos[..., 0] * sin[..., 1] * cos[..., 2], 0 * x[..., 0]]
+    expected = [
+        sin[..., 0] * cos[..., 1] * cos[..., 2],
+        -cos[..., 0] * sin[..., 1] * cos[..., 2],
+        0 * x[..., 0],
+    ]
     np.testing.assert_allclose(u, 1.5 * np.array(expected), atol=1e-14)
 
 
@@ -80,7 +86,9 @@ def test_abc_is_its_own_curl():
     ]
     np.testing.assert_allclose(u, expected, atol=1e-14)
     modes = abc(a, b, c)
-    np.testing.assert_allclose(1j * np.cross(modes.wavevectors, modes.amplitudes), modes.amplitudes, atol=1e-15)
+    np.testing.assert_allclose(
+        1j * np.cross(modes.wavevectors, modes.amplitudes), modes.amplitudes, atol=1e-15
+    )
 
 
 def test_too_few_cells_are_refused():

@@ -95,7 +95,10 @@ def test_mesh_of_several_blocks_is_openfoams_business(case):
     "text, expected",
     [
         ("f { type linearForcing; mode constantPower; power 0.1; }", ("linearForcing", "constantPower", 0.1)),
-        ("f { type linearForcing; mode constantCoefficient; A 2; }", ("linearForcing", "constantCoefficient", 2.0)),
+        (
+            "f { type linearForcing; mode constantCoefficient; A 2; }",
+            ("linearForcing", "constantCoefficient", 2.0),
+        ),
         (
             "f { type linearForcing; linearForcingCoeffs { mode constantPower; power 3; } }",
             ("linearForcing", "constantPower", 3.0),

@@ -44,7 +44,9 @@ def start(case, fresh: bool = False, end: float = END) -> Start:
 
 
 def names(folder) -> set[str]:
-    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} if folder.is_dir() else set()
+    return (
+        {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} if folder.is_dir() else set()
+    )
 
 
 def test_first_run(case):
@@ -80,7 +82,9 @@ def test_falls_back_to_the_latest_complete_time(case, defect, processors, caplog
     assert (case / "previous/1/postProcessing/fibers/0.2/fibers.h5").is_file()
     assert (case / "postProcessing/fibers/0/fibers.h5").is_file()
     moved = names(case / "previous/1")
-    assert moved and before == {n for n in names(case) if not n.startswith("previous")} | moved  # nothing is lost
+    assert (
+        moved and before == {n for n in names(case) if not n.startswith("previous")} | moved
+    )  # nothing is lost
 
 
 def test_one_truncated_rank_makes_a_time_incomplete(case):
@@ -128,7 +132,9 @@ def test_finished_run_begins_afresh_each_time_in_a_new_folder(case):
         add_time(case, "1")
         write(case, "report/report.json")
         assert start(case) == Start(0.0, False)
-        assert {"1/U", "report/report.json", "postProcessing/fibers/0/fibers.h5"} <= names(case / f"previous/{number}")
+        assert {"1/U", "report/report.json", "postProcessing/fibers/0/fibers.h5"} <= names(
+            case / f"previous/{number}"
+        )
     assert (case / "0.orig/U").is_file()
 
 

@@ -54,7 +54,9 @@ def patient(prepared):
 def long_case(prepared, tmp_path):
     """A run that does not end by itself."""
     case = tmp_path / "case"
-    shutil.copytree(prepared, case, ignore=shutil.ignore_patterns("log.*", "postProcessing", "gbm.*", "exchange"))
+    shutil.copytree(
+        prepared, case, ignore=shutil.ignore_patterns("log.*", "postProcessing", "gbm.*", "exchange")
+    )
     set_entry(case / "system/controlDict", "endTime", "1000")
     set_entry(case / "system/controlDict", "writeInterval", "5")
     yield case
@@ -70,7 +72,9 @@ def records(case) -> int:
 
 def shortened(case, more_steps: int = 8) -> None:
     """endTime a few steps after the latest time that is written."""
-    latest = max((float(p.name) for p in case.iterdir() if p.name[0].isdigit() and p.name != "0.orig"), default=0)
+    latest = max(
+        (float(p.name) for p in case.iterdir() if p.name[0].isdigit() and p.name != "0.orig"), default=0
+    )
     set_entry(case / "system/controlDict", "endTime", repr(round(latest + more_steps * 0.02, 6)))
 
 
@@ -85,21 +89,51 @@ def _then_close(solver, data: bytes) -> None:
 SOLVER_FAULTS = {
     "truncated": (lambda s: _then_close(s, s.sample(4).encode()[:500]), "closed the connection"),
     "cut in the header": (lambda s: _then_close(s, s.sample(4).encode()[:17]), "closed the connection"),
-    "short": (lambda s: s.raw(Message(Kind.SAMPLE, 4, 0.08, b"\0" * 800).encode()), "SAMPLE of step 4 has 800 bytes"),
-    "duplicated": (lambda s: s.raw(2 * s.sample(4).encode()), "SAMPLE is of step 4, time 0.08; step 5, time 0.1"),
-    "out of order": (lambda s: s.raw(s.sample(6).encode()), "SAMPLE is of step 6, time 0.12; step 4, time 0.08"),
-    "late": (lambda s: s.raw(header(s.sample(4), time=0.09)), "SAMPLE is of step 4, time 0.09; step 4, time 0.08"),
+    "short": (
+        lambda s: s.raw(Message(Kind.SAMPLE, 4, 0.08, b"\0" * 800).encode()),
+        "SAMPLE of step 4 has 800 bytes",
+    ),
+    "duplicated": (
+        lambda s: s.raw(2 * s.sample(4).encode()),
+        "SAMPLE is of step 4, time 0.08; step 5, time 0.1",
+    ),
+    "out of order": (
+        lambda s: s.raw(s.sample(6).encode()),
+        "SAMPLE is of step 6, time 0.12; step 4, time 0.08",
+    ),
+    "late": (
+        lambda s: s.raw(header(s.sample(4), time=0.09)),
+        "SAMPLE is of step 4, time 0.09; step 4, time 0.08",
+    ),
     "version": (lambda s: s.raw(header(s.sample(4), version=9)), "version 9 of the coupling protocol"),
     "unknown kind": (lambda s: s.raw(header(s.sample(4), kind=77)), "unknown kind 77"),
-    "kind of the other side": (lambda s: s.raw(Message(Kind.WELCOME, 4, 0.08).encode()), "received WELCOME where"),
-    "not a message": (lambda s: s.raw(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" + b"." * 40), "not a message of a gbm"),
-    "oversize": (lambda s: s.raw(header(s.sample(4), size=1 << 50)), f"announces {1 << 50} bytes where at most"),
+    "kind of the other side": (
+        lambda s: s.raw(Message(Kind.WELCOME, 4, 0.08).encode()),
+        "received WELCOME where",
+    ),
+    "not a message": (
+        lambda s: s.raw(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" + b"." * 40),
+        "not a message of a gbm",
+    ),
+    "oversize": (
+        lambda s: s.raw(header(s.sample(4), size=1 << 50)),
+        f"announces {1 << 50} bytes where at most",
+    ),
     "NaN": (lambda s: s.raw(s.sample(4, NAN).encode()), "SAMPLE of step 4 holds values that are not finite"),
     "NaN time": (lambda s: s.raw(header(s.sample(4), time=NAN)), "has the time nan"),
-    "foreign folder": (lambda s: s.raw(Message(Kind.SAVE, 4, 0.08, b"../../etc").encode()), "is not a time folder"),
-    "save of another step": (lambda s: s.raw(Message(Kind.SAVE, 3, 0.06, b"0.06").encode()), "SAVE is of step 3"),
+    "foreign folder": (
+        lambda s: s.raw(Message(Kind.SAVE, 4, 0.08, b"../../etc").encode()),
+        "is not a time folder",
+    ),
+    "save of another step": (
+        lambda s: s.raw(Message(Kind.SAVE, 3, 0.06, b"0.06").encode()),
+        "SAVE is of step 3",
+    ),
     "early end": (lambda s: s.raw(Message(Kind.END, 1, 0.02).encode()), "END is of step 1"),
-    "error": (lambda s: s.raw(Message(Kind.ERROR, 4, 0.08, b"out of coffee").encode()), "stopped: out of coffee"),
+    "error": (
+        lambda s: s.raw(Message(Kind.ERROR, 4, 0.08, b"out of coffee").encode()),
+        "stopped: out of coffee",
+    ),
     "silence": (lambda s: None, f"OpenFOAM was silent for {TIMEOUT} s"),
     "half a message, then silence": (lambda s: s.raw(s.sample(4).encode()[:500]), "was silent"),
 }
@@ -177,18 +211,42 @@ def _cut(channel, first, beads):
 
 DAEMON_FAULTS = {
     "truncated": (_cut, "the daemon closed the connection"),
-    "short": (_after_greeting(lambda n: positions(1, n - 1).encode()), f"has {24 * 71} bytes, expected {24 * 72}"),
-    "duplicated": (_after_greeting(lambda n: positions(0, n).encode()), "POSITIONS is of step 0, expected step 1"),
-    "out of order": (_after_greeting(lambda n: positions(2, n).encode()), "POSITIONS is of step 2, expected step 1"),
-    "late": (_after_greeting(lambda n: positions(1, n, time=0.03).encode()), "are of time 0.03, expected time 0.02"),
-    "version": (_after_greeting(lambda n: header(positions(1, n), version=9)), "version 9 of the coupling protocol"),
-    "unknown kind": (_after_greeting(lambda n: header(positions(1, n), kind=77)), "message of unknown type 77"),
+    "short": (
+        _after_greeting(lambda n: positions(1, n - 1).encode()),
+        f"has {24 * 71} bytes, expected {24 * 72}",
+    ),
+    "duplicated": (
+        _after_greeting(lambda n: positions(0, n).encode()),
+        "POSITIONS is of step 0, expected step 1",
+    ),
+    "out of order": (
+        _after_greeting(lambda n: positions(2, n).encode()),
+        "POSITIONS is of step 2, expected step 1",
+    ),
+    "late": (
+        _after_greeting(lambda n: positions(1, n, time=0.03).encode()),
+        "are of time 0.03, expected time 0.02",
+    ),
+    "version": (
+        _after_greeting(lambda n: header(positions(1, n), version=9)),
+        "version 9 of the coupling protocol",
+    ),
+    "unknown kind": (
+        _after_greeting(lambda n: header(positions(1, n), kind=77)),
+        "message of unknown type 77",
+    ),
     "kind of the other side": (
         _after_greeting(lambda n: header(positions(1, n), kind=4)),
         "expected POSITIONS, received SAMPLE",
     ),
-    "not a message": (_after_greeting(lambda n: b"HTTP/1.1 400 Bad Request\r\n" + b"." * 80), "is not a gbm daemon"),
-    "oversize": (_after_greeting(lambda n: header(positions(1, n), size=1 << 50)), f"announces {1 << 50} bytes"),
+    "not a message": (
+        _after_greeting(lambda n: b"HTTP/1.1 400 Bad Request\r\n" + b"." * 80),
+        "is not a gbm daemon",
+    ),
+    "oversize": (
+        _after_greeting(lambda n: header(positions(1, n), size=1 << 50)),
+        f"announces {1 << 50} bytes",
+    ),
     "NaN": (_after_greeting(lambda n: positions(1, n, NAN).encode()), "POSITIONS are not finite at bead 0"),
     "infinite": (_after_greeting(lambda n: positions(1, n, float("inf")).encode()), "not finite at bead 0"),
     "NaN time": (_after_greeting(lambda n: header(positions(1, n), time=NAN)), "are of time nan"),
@@ -197,11 +255,20 @@ DAEMON_FAULTS = {
         "the daemon stopped: out of tea",
     ),
     "silence": (_after_greeting(lambda n: None), "the daemon was silent for 1.5 s"),
-    "half a message, then silence": (_after_greeting(lambda n: positions(1, n).encode()[:500]), "was silent for"),
+    "half a message, then silence": (
+        _after_greeting(lambda n: positions(1, n).encode()[:500]),
+        "was silent for",
+    ),
     "welcome without families": (_welcome(1, 0), "WELCOME has 16 bytes"),
     "welcome with a negative count": (_welcome(1, 1, -3, 4), "WELCOME holds numbers that are not allowed"),
-    "welcome with too many beads": (_welcome(1, 1, 1 << 40, 1 << 40), "WELCOME holds numbers that are not allowed"),
-    "welcome with fewer families than said": (_welcome(1, 9, 3, 4), "WELCOME holds numbers that are not allowed"),
+    "welcome with too many beads": (
+        _welcome(1, 1, 1 << 40, 1 << 40),
+        "WELCOME holds numbers that are not allowed",
+    ),
+    "welcome with fewer families than said": (
+        _welcome(1, 9, 3, 4),
+        "WELCOME holds numbers that are not allowed",
+    ),
     "welcome that wants the unknown": (_welcome(7, 1, 3, 4), "WELCOME holds numbers that are not allowed"),
 }
 
@@ -320,7 +387,9 @@ def test_stale_files_and_the_session_of_a_killed_daemon(tmp_path):
     """A solver that finds the session of a killed daemon is served by the next one, which clears the rest."""
     case = make_case(tmp_path / "case", transport="file", timeout=30, tight=False)
     killed = start_gbm("daemon", case)
-    session = until(lambda: (case / "exchange/session").exists() and (case / "exchange/session").read_text(), "it")
+    session = until(
+        lambda: (case / "exchange/session").exists() and (case / "exchange/session").read_text(), "it"
+    )
     killed.kill()
     killed.communicate()
     for name in ("flow.0", "fibers.3", "fibers.4.part"):
@@ -426,7 +495,9 @@ def small_disk(tmp_path):
 
     def mount(folder, size: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True)
+        done = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], capture_output=True
+        )
         if done.returncode:
             pytest.skip("a small file system can only be mounted by root")
         mounted.append(folder)

@@ -96,7 +96,10 @@ def test_welcome_is_a_list_of_integers():
         (b"GBMC" + struct.pack("<HHIIqdQ", 2, 1, 0, 0, 0, 0.0, 0), "version 2"),
         (b"GBMC" + struct.pack("<HHIIqdQ", 1, 0, 0, 0, 0, 0.0, 0), "unknown kind 0"),
         (b"GBMC" + struct.pack("<HHIIqdQ", 1, 9, 0, 0, 0, 0.0, 0), "unknown kind 9"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", 1, 4, 0, 0, 0, 0.0, MAX_TEXT + 1), f"announces {MAX_TEXT + 1} bytes"),
+        (
+            b"GBMC" + struct.pack("<HHIIqdQ", 1, 4, 0, 0, 0, 0.0, MAX_TEXT + 1),
+            f"announces {MAX_TEXT + 1} bytes",
+        ),
         (b"GBMC" + struct.pack("<HHIIqdQ", 1, 4, 0, 0, 5, float("inf"), 0), "step 5 has the time inf"),
     ],
 )
@@ -113,7 +116,22 @@ def test_size_that_is_expected_is_taken():
 
 
 @pytest.mark.parametrize(
-    "folder", ["", ".", "..", "../0", "/etc", "0/..", "processor0", "processor0/../0", "processor/0", "a", "0\n", "0\0", "0 1"]
+    "folder",
+    [
+        "",
+        ".",
+        "..",
+        "../0",
+        "/etc",
+        "0/..",
+        "processor0",
+        "processor0/../0",
+        "processor/0",
+        "a",
+        "0\n",
+        "0\0",
+        "0 1",
+    ],
 )
 def test_folder_that_is_no_time(folder):
     with pytest.raises(ProtocolError, match="is not a time folder"):

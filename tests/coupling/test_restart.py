@@ -50,7 +50,11 @@ def check_series(case, steps: int = STEPS) -> None:
         x = recording.families["test"].positions[:]
         assert x.shape[0] == steps + 1
         assert np.abs(np.diff(x, axis=0)).max() < 5 * TIME_STEP  # no jump: |u| < 5
-    for folder, name in (("linearForcing", "linearForcing.dat"), ("fibers", "daemon.dat"), ("fibers", "coupling.dat")):
+    for folder, name in (
+        ("linearForcing", "linearForcing.dat"),
+        ("fibers", "daemon.dat"),
+        ("fibers", "coupling.dat"),
+    ):
         table = read_dat(case / "postProcessing" / folder, name)
         np.testing.assert_allclose(table["Time"], TIME_STEP * np.arange(steps + 1), atol=1e-9, err_msg=name)
 
@@ -103,10 +107,14 @@ def test_killed_and_continued_is_the_uninterrupted_run(scheme, make, whole):
     print(scheme, distance(final(case), final(whole(scheme))))
     assert distance(final(case), final(whole(scheme))) == 0
     check_series(case)
-    table, expected = (read_dat(c / "postProcessing/linearForcing", "linearForcing.dat") for c in (case, whole(scheme)))
+    table, expected = (
+        read_dat(c / "postProcessing/linearForcing", "linearForcing.dat") for c in (case, whole(scheme))
+    )
     for column in table:
         scale = np.abs(expected[column]).max()
-        np.testing.assert_allclose(table[column], expected[column], rtol=0, atol=1e-9 * scale + 1e-15, err_msg=column)
+        np.testing.assert_allclose(
+            table[column], expected[column], rtol=0, atol=1e-9 * scale + 1e-15, err_msg=column
+        )
 
 
 @pytest.mark.parametrize("kills", [(3,), (7, 17)], ids=["before the first write", "twice"])
