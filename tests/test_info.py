@@ -6,10 +6,11 @@ import json
 
 import numpy as np
 import pytest
-from conftest import gbm, make_case, set_entry
 
 from gbm_plugin.case.info import figures
 from gbm_plugin.case.scene import read_scene
+
+from conftest import gbm, make_case, set_entry
 
 
 @pytest.fixture

@@ -10,10 +10,11 @@ import time
 
 import numpy as np
 import pytest
-from conftest import gbm, make_case, run_case, set_entry
 
 from gbm_plugin.output.dat import read_dat
 from gbm_plugin.output.recording import open_recording
+
+from conftest import gbm, make_case, run_case, set_entry
 
 SPECTRAL = ("--flow", "spectral")
 

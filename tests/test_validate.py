@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from conftest import DEFAULT_CASE
-
 from gbm_plugin.validate import table, validate
+
+from conftest import DEFAULT_CASE
 
 
 def test_flow_and_fibers_converge_at_second_order():

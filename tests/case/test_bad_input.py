@@ -8,9 +8,10 @@ import shutil
 import numpy as np
 import pytest
 
-from conftest import gbm, make_case, set_entry
 from gbm_plugin.cli import main
 from gbm_plugin.output.recording import open_recording
+
+from conftest import gbm, make_case, set_entry
 
 FIBERS, CONTROL = "constant/fiberProperties", "system/controlDict"
 NU, OPTIONS = "constant/transportProperties", "constant/fvOptions"

@@ -8,10 +8,11 @@ import shutil
 import numpy as np
 import pytest
 
-from conftest import DEFAULT_CASE, HEADER
 from gbm_plugin.case.dictionary import CaseError
 from gbm_plugin.case.initial import read_initial_field
 from gbm_plugin.case.scene import Coupling, Forcing, Model, read_scene
+
+from conftest import DEFAULT_CASE, HEADER
 
 
 @pytest.fixture

@@ -13,12 +13,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from conftest import start_solver
 
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.coupling.channel import listen
 from gbm_plugin.coupling.message import Hello, Kind, Message, encode_array, encode_header, encode_welcome
+
+from conftest import start_solver
 
 BOX = 2 * np.pi
 PATIENCE = 60  # s, beyond any timeout of these tests

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from conftest import start_solver
 
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.coupling.channel import listen
@@ -15,6 +14,8 @@ from gbm_plugin.coupling.message import (
     encode_array,
     encode_welcome,
 )
+
+from conftest import start_solver
 
 
 def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import divide, make_case, run_case
 
 from gbm_plugin.output.recording import open_recording
+
+from conftest import divide, make_case, run_case
 
 STEPS = 20
 BOX = 2 * np.pi

@@ -11,6 +11,11 @@ import subprocess
 import time
 
 import pytest
+
+from gbm_plugin.case.openfoam import fatal_message
+from gbm_plugin.coupling.message import Kind, Message
+from gbm_plugin.output.recording import open_recording
+
 from conftest import gbm, make_case, set_entry, start_solver
 from fakes import (
     FakeSolver,
@@ -25,10 +30,6 @@ from fakes import (
     start_gbm,
     until,
 )
-
-from gbm_plugin.case.openfoam import fatal_message
-from gbm_plugin.coupling.message import Kind, Message
-from gbm_plugin.output.recording import open_recording
 
 TIMEOUT = 1.5
 NAN = float("nan")

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import make_case, start_solver
 
 from gbm_plugin.output.dat import read_dat
+
+from conftest import make_case, start_solver
 
 STEPS = 15
 SLOW_DAEMON = Path(__file__).with_name("slow_daemon.py")

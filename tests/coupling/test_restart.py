@@ -8,11 +8,12 @@ import signal
 
 import numpy as np
 import pytest
-from conftest import gbm, make_case, run_case, set_entry
-from fakes import Run, kill_all_of
 
 from gbm_plugin.output.dat import read_dat
 from gbm_plugin.output.recording import open_recording
+
+from conftest import gbm, make_case, run_case, set_entry
+from fakes import Run, kill_all_of
 
 STEPS, TIME_STEP = 20, 0.02
 SCHEMES = ("Euler", "backward", "CrankNicolson 0.9")

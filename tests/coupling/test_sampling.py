@@ -5,10 +5,11 @@ from __future__ import annotations
 import fluidfoam
 import numpy as np
 import pytest
-from conftest import divide, set_entry
-from probe import probe
 
 from gbm_plugin.case.openfoam import utility
+
+from conftest import divide, set_entry
+from probe import probe
 
 BOX = 2 * np.pi
 CELLS = 16

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step
 
 from gbm_plugin import Fibers, simulate
 from gbm_plugin.flow import LinearFlow, TaylorGreen
+
+from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step
 
 STILL = LinearFlow(np.zeros((3, 3)))
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step, straight_chain
 
 from gbm_plugin import Fibers, simulate
 from gbm_plugin.flow import LinearFlow
+
+from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step, straight_chain
 
 SHEAR = LinearFlow([[0, 1, 0], [0, 0, 0], [0, 0, 0]])
 METHODS = [("ab3", "freeDrain"), ("implicit", "freeDrain"), ("ab3", "rpy"), ("implicit", "rpy")]

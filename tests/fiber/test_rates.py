@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from fiber_cases import bent, crooked, dense_solution, positions_of, straight_chain
 
 from gbm_plugin.fiber import Fibers, instant_rates
+
+from fiber_cases import bent, crooked, dense_solution, positions_of, straight_chain
 
 BETA = np.array([4.730040745, 7.853204624, 10.995607838])  # free-free beam
 

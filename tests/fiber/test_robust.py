@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from fiber_cases import WavyFlow, bent, crooked, positions_of, rpy_matrix, run_once_per_step
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gbm_plugin import Fibers, simulate
 from gbm_plugin.fiber import Stepper
 from gbm_plugin.flow import LinearFlow
+
+from fiber_cases import WavyFlow, bent, crooked, positions_of, rpy_matrix, run_once_per_step
 
 STILL = LinearFlow(np.zeros((3, 3)))
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import HEADER, make_case, set_entry, start_solver
 
 from gbm_plugin.output.dat import read_dat
+
+from conftest import HEADER, make_case, set_entry, start_solver
 
 A, NU, CELLS = 0.5, 0.01, 16
 UNIFORM = "((0 0 0) (0.3 -0.2 0.1) (0 0 0))"

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import DEFAULT_CASE, FAMILY, HEADER, gbm, start_solver
 
 from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
+
+from conftest import DEFAULT_CASE, FAMILY, HEADER, gbm, start_solver
 
 README = Path(__file__).parents[2] / "README.md"
 

@@ -7,10 +7,11 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from conftest import gbm, make_case, run_case
 
 from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
+
+from conftest import gbm, make_case, run_case
 
 FAMILIES = """
     soft { count 5; beads 6; length 1.2; bendingStiffness 1e-5; seed 3; }

@@ -10,10 +10,11 @@ from pathlib import Path
 import fluidfoam
 import numpy as np
 import pytest
-from conftest import HEADER, make_case, set_entry, start_solver
 
 from gbm_plugin.case.initial import write_velocity
 from gbm_plugin.case.openfoam import fatal_message, utility
+
+from conftest import HEADER, make_case, set_entry, start_solver
 
 STEPS = 3
 TIME = "0.06"

@@ -1,7 +1,8 @@
 import pytest
-from sample_records import FAMILIES, SCENE, records
 
 from gbm_plugin.output.recording import Recorder
+
+from sample_records import FAMILIES, SCENE, records
 
 
 @pytest.fixture

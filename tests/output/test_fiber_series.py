@@ -5,11 +5,12 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from sample_records import BOX, FAMILIES, SCENE, records
 
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
 from gbm_plugin.output.series import cut_at_faces, write_series
 from gbm_plugin.statistics.fibers import curvature
+
+from sample_records import BOX, FAMILIES, SCENE, records
 
 STEPS = range(3, 12, 2)
 

@@ -1,10 +1,11 @@
 import matplotlib.image
 import numpy as np
 from matplotlib.collections import QuadMesh
-from sample_records import BOX, SCENE
 
 from gbm_plugin.output.picture import Camera, fibers_picture
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
+
+from sample_records import BOX, SCENE
 
 ORIGIN, SIZE = np.zeros(3), np.full(3, BOX)
 

@@ -10,11 +10,12 @@ import time
 import h5py
 import numpy as np
 import pytest
-from sample_records import BOX, FAMILIES, SCENE, records
 
 from gbm_plugin.output import transaction
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
 from gbm_plugin.output.transaction import FileFullError
+
+from sample_records import BOX, FAMILIES, SCENE, records
 
 
 def check_records(recording, steps):

@@ -4,6 +4,12 @@ import shutil
 
 import numpy as np
 import pytest
+
+from gbm_plugin.output import field
+from gbm_plugin.output.recording import Recorder, open_recording
+from gbm_plugin.output.report import report
+from gbm_plugin.output.series import write_series
+
 from fake_case import (
     BLOCK_MESH,
     bent_fibers,
@@ -14,11 +20,6 @@ from fake_case import (
     write_velocity,
 )
 from sample_records import BOX, FAMILIES, SCENE, records
-
-from gbm_plugin.output import field
-from gbm_plugin.output.recording import Recorder, open_recording
-from gbm_plugin.output.report import report
-from gbm_plugin.output.series import write_series
 
 needs_mesh = pytest.mark.skipif(BLOCK_MESH is None, reason="OpenFOAM's blockMesh is not installed")
 FIGURES = ["end_to_end", "energy", "fibers", "spectrum"]
