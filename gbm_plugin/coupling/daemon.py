@@ -7,6 +7,7 @@ first steps, whose history is too short, are corrected with a second sample (`pr
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import secrets
 import signal
@@ -24,6 +25,7 @@ from ..output.recording import FamilyRecord, Recorder
 from .channel import Channel, CouplingError, Listener, listen
 from .fleet import Fleet
 from .message import (
+    MAX_TEXT,
     PROVISIONAL,
     STOP,
     Hello,
@@ -108,10 +110,8 @@ class _StopFlag:
 
 
 def _say_why(channel: Channel, text: str) -> None:
-    try:
-        channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()))
-    except CouplingError:
-        pass  # the solver is gone: nobody is left to tell
+    with contextlib.suppress(CouplingError):  # the solver is gone: nobody is left to tell
+        channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()[:MAX_TEXT]))
 
 
 class Session:
