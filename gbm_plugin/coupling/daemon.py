@@ -25,7 +25,6 @@ from ..output.recording import FamilyRecord, Recorder
 from .channel import Channel, CouplingError, Listener, listen
 from .fleet import Fleet
 from .message import (
-    MAX_TEXT,
     PROVISIONAL,
     STOP,
     Hello,
@@ -110,8 +109,8 @@ class _StopFlag:
 
 
 def _say_why(channel: Channel, text: str) -> None:
-    with contextlib.suppress(CouplingError):  # the solver is gone: nobody is left to tell
-        channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()[:MAX_TEXT]))
+    with contextlib.suppress(CouplingError):  # the solver may be gone: nobody is left to tell
+        channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()))
 
 
 class Session:

@@ -83,13 +83,13 @@ MISTAKES = {
     "transport": (FIBERS, "transport socket;", "transport pigeon;", ["'transport'", "'pigeon'", "socket tcp file"]),
     "timeout": (FIBERS, "timeout 60;", "timeout 0;", ["'timeout'", "greater than 0"]),
     "port": (FIBERS, "timeout 60;", "port 99999;", ["'port'", "99999", "65535"]),
-    "viscosity": (NU, re.compile(r"0.01;"), "0;", ["'nu'", "is 0", "greater than 0"]),
-    "negative viscosity": (NU, re.compile(r"0.01;"), "[0 2 -1 0 0 0 0] -1;", ["'nu'", "greater than 0"]),
-    "no viscosity": (NU, re.compile(r"nu\s+0.01;"), "", ["'nu'", "is missing"]),
+    "viscosity": (NU, re.compile(r"(?<=nu)\s+[\d.e-]+;"), " 0;", ["'nu'", "is 0", "greater than 0"]),
+    "negative viscosity": (NU, re.compile(r"(?<=nu)\s+[\d.e-]+;"), " [0 2 -1 0 0 0 0] -1;", ["'nu'", "greater than 0"]),
+    "no viscosity": (NU, re.compile(r"nu\s+[\d.e-]+;"), "", ["'nu'", "is missing"]),
     "variable time step": (CONTROL, re.compile(r"(?<=adjustTimeStep)\s+no;"), " yes;", ["'adjustTimeStep'", "fixed"]),
     "no time step": (CONTROL, re.compile(r"(?<=deltaT)\s+0.02;"), " 0;", ["'deltaT'", "greater than 0"]),
     "no end": (CONTROL, re.compile(r"endTime\s+0.4;"), "", ["'endTime'", "is missing"]),
-    "forcing without power": (OPTIONS, re.compile(r"power\s+0.1;"), "", ["'power'", "is missing"]),
+    "forcing without power": (OPTIONS, re.compile(r"\bpower\s+[\d.]+;"), "", ["'power'", "is missing"]),
     "forcing mode": (OPTIONS, "constantPower;", "gentle;", ["'mode'", "'gentle'", "constantCoefficient"]),
     "forcing without type": (OPTIONS, re.compile(r"type\s+linearForcing;"), "", ["'type'", "is missing"]),
     "brace left open": (FIBERS, re.compile(r"\}\s*\Z"), "", ["not an OpenFOAM dictionary"]),
@@ -184,6 +184,7 @@ def test_mesh_that_is_not_a_box(small):
         text = text.replace(corner, corner.replace("(0     ", f"({x}").replace("($width ", f"({x} ", 1))
     mesh.write_text(text)
     set_entry(small / FIBERS, "interpolation", "cellPoint")
+    (small / "system/initialFieldDict").unlink()
     line = refused(small)
     assert "fibers need a mesh that is a whole, axis-aligned box" in line
 

@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
-from conftest import DEFAULT_CASE, HEADER
+from conftest import DEFAULT_CASE, HEADER, set_entry
 from gbm_plugin.case.dictionary import CaseError
 from gbm_plugin.case.initial import read_initial_field
 from gbm_plugin.case.scene import Coupling, Forcing, Model, read_scene
@@ -69,9 +69,10 @@ def test_families_keep_their_order(case):
 
 
 def test_macros_keep_every_digit(case):
+    set_entry(case / "system/blockMeshDict", "n", "24")
     scene = read_scene(case)
     assert scene.box == (2 * np.pi,) * 3  # $width of blockMeshDict
-    assert scene.cells == (32, 32, 32) and scene.origin == (0, 0, 0)
+    assert scene.cells == (24, 24, 24) and scene.origin == (0, 0, 0)
 
 
 def test_box_that_is_moved_and_scaled(case):
