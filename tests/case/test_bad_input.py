@@ -8,9 +8,10 @@ import shutil
 import numpy as np
 import pytest
 
-from conftest import gbm, make_case, set_entry
 from gbm_plugin.cli import main
 from gbm_plugin.output.recording import open_recording
+
+from conftest import gbm, make_case, set_entry
 
 FIBERS, CONTROL = "constant/fiberProperties", "system/controlDict"
 NU, OPTIONS = "constant/transportProperties", "constant/fvOptions"
@@ -44,9 +45,19 @@ FAMILIES = re.compile(r"families \{.*\}", re.S)
 
 # file, what is there, what is put there, what the line must say beside the file
 MISTAKES = {
-    "unknown entry": (FIBERS, "recordInterval", "recordIntervall", ["'recordIntervall'", "allowed:", "recordInterval "]),
+    "unknown entry": (
+        FIBERS,
+        "recordInterval",
+        "recordIntervall",
+        ["'recordIntervall'", "allowed:", "recordInterval "],
+    ),
     "unknown entry of a family": (FIBERS, "seed 3;", "seeds 3;", ["test", "'seeds'", "allowed:", " seed "]),
-    "unknown entry of coupling": (FIBERS, "timeout 60;", "timeOut 60;", ["coupling", "'timeOut'", "allowed:", "timeout"]),
+    "unknown entry of coupling": (
+        FIBERS,
+        "timeout 60;",
+        "timeOut 60;",
+        ["coupling", "'timeOut'", "allowed:", "timeout"],
+    ),
     "missing entry": (FIBERS, "beads 6;", "", ["'beads'", "is missing"]),
     "missing families": (FIBERS, "families {", "groups {", ["'families'"]),
     "no family": (FIBERS, FAMILIES, "families { }", ["'families'", "at least one"]),
@@ -57,11 +68,26 @@ MISTAKES = {
     "no fiber": (FIBERS, "count 12;", "count 0;", ["'count'", "is 0", "at least 1"]),
     "no length": (FIBERS, "length 1.2;", "length 0;", ["'length'", "is 0", "greater than 0"]),
     "negative length": (FIBERS, "length 1.2;", "length -1;", ["'length'", "-1", "greater than 0"]),
-    "length and radius": (FIBERS, "length 1.2;", "length 1.2; radius 0.1;", ["exactly one", "'length'", "'radius'"]),
+    "length and radius": (
+        FIBERS,
+        "length 1.2;",
+        "length 1.2; radius 0.1;",
+        ["exactly one", "'length'", "'radius'"],
+    ),
     "neither length nor radius": (FIBERS, "length 1.2;", "", ["exactly one", "'length'", "'radius'"]),
     "negative stiffness": (FIBERS, "Stiffness 1e-4;", "Stiffness -1;", ["'bendingStiffness'", "at least 0"]),
-    "stiffness twice": (FIBERS, "1e-4;", "1e-4; youngModulus 1;", ["exactly one", "'bendingStiffness'", "'youngModulus'"]),
-    "no stiffness": (FIBERS, "bendingStiffness 1e-4;", "", ["exactly one", "'bendingStiffness'", "'youngModulus'"]),
+    "stiffness twice": (
+        FIBERS,
+        "1e-4;",
+        "1e-4; youngModulus 1;",
+        ["exactly one", "'bendingStiffness'", "'youngModulus'"],
+    ),
+    "no stiffness": (
+        FIBERS,
+        "bendingStiffness 1e-4;",
+        "",
+        ["exactly one", "'bendingStiffness'", "'youngModulus'"],
+    ),
     "NaN": (FIBERS, "length 1.2;", "length nan;", ["'length'", "finite number"]),
     "word for a number": (FIBERS, "count 12;", "count many;", ["'count'", "'many'", "a number is needed"]),
     "huge number": (FIBERS, "count 12;", "count 1e400;", ["'count'", "finite number"]),
@@ -71,22 +97,62 @@ MISTAKES = {
     "negative seed": (FIBERS, "seed 3;", "seed -3;", ["'seed'", "at least 0"]),
     "no density": (FIBERS, "recordInterval 1;", "recordInterval 1; rho 0;", ["'rho'", "greater than 0"]),
     "no interval": (FIBERS, "recordInterval 1;", "recordInterval 0;", ["'recordInterval'", "at least 1"]),
-    "integrator": (FIBERS, "integrator ab3;", "integrator rk4;", ["'integrator'", "'rk4'", "ab3 implicit auto"]),
-    "mobility": (FIBERS, "integrator ab3;", "mobility slender;", ["'mobility'", "'slender'", "freeDrain rpy"]),
-    "bending torque": (FIBERS, "integrator ab3;", "bendingTorque half;", ["'bendingTorque'", "consistent asPrinted"]),
+    "integrator": (
+        FIBERS,
+        "integrator ab3;",
+        "integrator rk4;",
+        ["'integrator'", "'rk4'", "ab3 implicit auto"],
+    ),
+    "mobility": (
+        FIBERS,
+        "integrator ab3;",
+        "mobility slender;",
+        ["'mobility'", "'slender'", "freeDrain rpy"],
+    ),
+    "bending torque": (
+        FIBERS,
+        "integrator ab3;",
+        "bendingTorque half;",
+        ["'bendingTorque'", "consistent asPrinted"],
+    ),
     "curvature law": (FIBERS, "integrator ab3;", "curvatureLaw tan;", ["'curvatureLaw'", "sine discreteRod"]),
-    "strain in free drain": (FIBERS, "integrator ab3;", "strainCoupling yes;", ["'strainCoupling'", "needs rpy"]),
-    "no switch": (FIBERS, "integrator ab3;", "strainCoupling maybe;", ["'strainCoupling'", "'maybe'", "yes no"]),
+    "strain in free drain": (
+        FIBERS,
+        "integrator ab3;",
+        "strainCoupling yes;",
+        ["'strainCoupling'", "needs rpy"],
+    ),
+    "no switch": (
+        FIBERS,
+        "integrator ab3;",
+        "strainCoupling maybe;",
+        ["'strainCoupling'", "'maybe'", "yes no"],
+    ),
     "tolerance of ab3": (FIBERS, "ab3;", "ab3; tolerance 1e-3;", ["'tolerance'", "implicit or auto"]),
     "shape": (FIBERS, "seed 3;", "shape curly;", ["'shape'", "'curly'", "straight file"]),
-    "positions that are not there": (FIBERS, "seed 3;", "shape file; positions no.npy;", ["'positions'", "no.npy"]),
-    "transport": (FIBERS, "transport socket;", "transport pigeon;", ["'transport'", "'pigeon'", "socket tcp file"]),
+    "positions that are not there": (
+        FIBERS,
+        "seed 3;",
+        "shape file; positions no.npy;",
+        ["'positions'", "no.npy"],
+    ),
+    "transport": (
+        FIBERS,
+        "transport socket;",
+        "transport pigeon;",
+        ["'transport'", "'pigeon'", "socket tcp file"],
+    ),
     "timeout": (FIBERS, "timeout 60;", "timeout 0;", ["'timeout'", "greater than 0"]),
     "port": (FIBERS, "timeout 60;", "port 99999;", ["'port'", "99999", "65535"]),
     "viscosity": (NU, re.compile(r"(?<=nu)\s+[\d.e-]+;"), " 0;", ["'nu'", "is 0", "greater than 0"]),
     "negative viscosity": (NU, re.compile(r"(?<=nu)\s+[\d.e-]+;"), " [0 2 -1 0 0 0 0] -1;", ["'nu'", "greater than 0"]),
     "no viscosity": (NU, re.compile(r"nu\s+[\d.e-]+;"), "", ["'nu'", "is missing"]),
-    "variable time step": (CONTROL, re.compile(r"(?<=adjustTimeStep)\s+no;"), " yes;", ["'adjustTimeStep'", "fixed"]),
+    "variable time step": (
+        CONTROL,
+        re.compile(r"(?<=adjustTimeStep)\s+no;"),
+        " yes;",
+        ["'adjustTimeStep'", "fixed"],
+    ),
     "no time step": (CONTROL, re.compile(r"(?<=deltaT)\s+0.02;"), " 0;", ["'deltaT'", "greater than 0"]),
     "no end": (CONTROL, re.compile(r"endTime\s+0.4;"), "", ["'endTime'", "is missing"]),
     "forcing without power": (OPTIONS, re.compile(r"\bpower\s+[\d.]+;"), "", ["'power'", "is missing"]),
@@ -178,7 +244,12 @@ def test_mesh_that_is_not_a_box(small):
     """A parallelepiped: translations still map its faces onto each other."""
     mesh = small / "system/blockMeshDict"
     text = mesh.read_text()
-    for corner in ("(0      0      $width)", "($width 0      $width)", "($width $width $width)", "(0      $width $width)"):
+    for corner in (
+        "(0      0      $width)",
+        "($width 0      $width)",
+        "($width $width $width)",
+        "(0      $width $width)",
+    ):
         assert corner in text
         x = "1" if corner.startswith("(0") else "7.283185307179586"
         text = text.replace(corner, corner.replace("(0     ", f"({x}").replace("($width ", f"({x} ", 1))

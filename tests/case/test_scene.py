@@ -8,10 +8,11 @@ import shutil
 import numpy as np
 import pytest
 
-from conftest import DEFAULT_CASE, HEADER, set_entry
 from gbm_plugin.case.dictionary import CaseError
 from gbm_plugin.case.initial import read_initial_field
 from gbm_plugin.case.scene import Coupling, Forcing, Model, read_scene
+
+from conftest import DEFAULT_CASE, HEADER, set_entry
 
 
 @pytest.fixture
@@ -96,7 +97,10 @@ def test_mesh_of_several_blocks_is_openfoams_business(case):
     "text, expected",
     [
         ("f { type linearForcing; mode constantPower; power 0.1; }", ("linearForcing", "constantPower", 0.1)),
-        ("f { type linearForcing; mode constantCoefficient; A 2; }", ("linearForcing", "constantCoefficient", 2.0)),
+        (
+            "f { type linearForcing; mode constantCoefficient; A 2; }",
+            ("linearForcing", "constantCoefficient", 2.0),
+        ),
         (
             "f { type linearForcing; linearForcingCoeffs { mode constantPower; power 3; } }",
             ("linearForcing", "constantPower", 3.0),
