@@ -144,9 +144,9 @@ MISTAKES = {
     ),
     "timeout": (FIBERS, "timeout 60;", "timeout 0;", ["'timeout'", "greater than 0"]),
     "port": (FIBERS, "timeout 60;", "port 99999;", ["'port'", "99999", "65535"]),
-    "viscosity": (NU, re.compile(r"(?<=nu)\s+[\d.e-]+;"), " 0;", ["'nu'", "is 0", "greater than 0"]),
-    "negative viscosity": (NU, re.compile(r"(?<=nu)\s+[\d.e-]+;"), " [0 2 -1 0 0 0 0] -1;", ["'nu'", "greater than 0"]),
-    "no viscosity": (NU, re.compile(r"nu\s+[\d.e-]+;"), "", ["'nu'", "is missing"]),
+    "viscosity": (NU, re.compile(r"0.01;"), "0;", ["'nu'", "is 0", "greater than 0"]),
+    "negative viscosity": (NU, re.compile(r"0.01;"), "[0 2 -1 0 0 0 0] -1;", ["'nu'", "greater than 0"]),
+    "no viscosity": (NU, re.compile(r"nu\s+0.01;"), "", ["'nu'", "is missing"]),
     "variable time step": (
         CONTROL,
         re.compile(r"(?<=adjustTimeStep)\s+no;"),
