@@ -197,7 +197,7 @@ class _Pair:
             causes.append(f"{name} was ended by {signal.Signals(-solver).name} ({self.solver_log})")
         if daemon < 0 and self.daemon not in self.ended_here:
             causes.append(f"the daemon was ended by {signal.Signals(-daemon).name} ({self.daemon_log})")
-        if daemon > 0 and daemon_problem and (not problem or "the daemon stopped:" in problem):
+        if daemon_problem and (not problem or "the daemon stopped:" in problem):
             causes.append(f"{daemon_problem} ({self.daemon_log})")
         elif problem:
             causes.append(f"{name}: {problem} ({self.solver_log})")

@@ -155,7 +155,7 @@ MISTAKES = {
     ),
     "no time step": (CONTROL, re.compile(r"(?<=deltaT)\s+0.02;"), " 0;", ["'deltaT'", "greater than 0"]),
     "no end": (CONTROL, re.compile(r"endTime\s+0.4;"), "", ["'endTime'", "is missing"]),
-    "forcing without power": (OPTIONS, re.compile(r"power\s+0.1;"), "", ["'power'", "is missing"]),
+    "forcing without power": (OPTIONS, re.compile(r"\bpower\s+[\d.]+;"), "", ["'power'", "is missing"]),
     "forcing mode": (OPTIONS, "constantPower;", "gentle;", ["'mode'", "'gentle'", "constantCoefficient"]),
     "forcing without type": (OPTIONS, re.compile(r"type\s+linearForcing;"), "", ["'type'", "is missing"]),
     "brace left open": (FIBERS, re.compile(r"\}\s*\Z"), "", ["not an OpenFOAM dictionary"]),
@@ -255,6 +255,7 @@ def test_mesh_that_is_not_a_box(small):
         text = text.replace(corner, corner.replace("(0     ", f"({x}").replace("($width ", f"({x} ", 1))
     mesh.write_text(text)
     set_entry(small / FIBERS, "interpolation", "cellPoint")
+    (small / "system/initialFieldDict").unlink()
     line = refused(small)
     assert "fibers need a mesh that is a whole, axis-aligned box" in line
 
