@@ -3,6 +3,31 @@
 #include "surfaceFields.H"
 #include "volFields.H"
 
+namespace
+{
+
+//- The fields that were read, and their old times
+template<class Type>
+void correctBoundaries(const Foam::fvMesh& mesh)
+{
+    using namespace Foam;
+    typedef GeometricField<Type, fvPatchField, volMesh> fieldType;
+
+    for (const word& name : mesh.sortedNames<fieldType>())
+    {
+        fieldType* field = mesh.getObjectPtr<fieldType>(name);
+
+        for (label older = field->nOldTimes(); older >= 0; --older)
+        {
+            field->correctBoundaryConditions();
+            field = older ? &field->oldTime() : field;
+        }
+    }
+}
+
+}
+
+
 void Foam::consistentStart
 (
     const fvMesh& mesh,
@@ -10,23 +35,18 @@ void Foam::consistentStart
     const word& phiName
 )
 {
-    volVectorField* U = mesh.getObjectPtr<volVectorField>(UName);
-
-    if (!Pstream::parRun() || !U)
+    if (!Pstream::parRun())
     {
         return;
     }
 
-    volVectorField* old = U;
-    for (label i = U->nOldTimes(); i >= 0; --i)
-    {
-        old->correctBoundaryConditions();
-        old = i ? &old->oldTime() : old;
-    }
+    correctBoundaries<scalar>(mesh);
+    correctBoundaries<vector>(mesh);
 
+    const volVectorField* U = mesh.findObject<volVectorField>(UName);
     surfaceScalarField* phi = mesh.getObjectPtr<surfaceScalarField>(phiName);
 
-    if (phi)
+    if (U && phi)
     {
         IOobject file
         (
