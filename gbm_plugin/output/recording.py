@@ -18,7 +18,8 @@ __all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open
 
 
 class Positions:
-    """Positions (S, F, N, 3) [m] of one family, read from the files when indexed; numpy's basic indexing."""
+    """Positions (S, F, N, 3) [m] of one family, read from the files when indexed: by slices
+    and whole numbers, and times also by an array of them or of truth values."""
 
     def __init__(self, parts: list[tuple[h5py.Dataset, int]]) -> None:
         """parts: datasets in the order of time, and how many of the first records of each count."""
@@ -33,8 +34,8 @@ class Positions:
 
     def __getitem__(self, key) -> NDArray[np.float64]:
         key = key if isinstance(key, tuple) else (key,)
-        if Ellipsis in key:
-            at = key.index(Ellipsis)
+        if any(k is Ellipsis for k in key):
+            at = next(i for i, k in enumerate(key) if k is Ellipsis)
             key = key[:at] + (slice(None),) * (self.ndim - len(key) + 1) + key[at + 1 :]
         rows, rest = np.arange(len(self))[key[0]] if key else np.arange(len(self)), key[1:]
         if np.ndim(rows) == 0:
