@@ -18,8 +18,8 @@ __all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open
 
 
 class Positions:
-    """Positions (S, F, N, 3) [m] of one family, read from the files when indexed: by slices
-    and whole numbers, and times also by an array of them or of truth values."""
+    """Positions (S, F, N, 3) [m] of one family, read from the files when indexed: by slices and whole numbers,
+    times also by an array of them or of truth values."""
 
     def __init__(self, parts: list[tuple[h5py.Dataset, int]]) -> None:
         """parts: datasets in the order of time, and how many of the first records of each count."""
