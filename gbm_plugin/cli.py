@@ -63,7 +63,6 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument(
         "--fresh", action="store_true", help="from the beginning; earlier results go to previous/<n>"
     )
-
     sub.add_argument(
         "--flow",
         choices=("openfoam", "spectral"),

@@ -70,7 +70,7 @@ def run_spectral(case: Path | str, **options) -> None:
 @contextmanager
 def _only_run(case: Path) -> Iterator[int]:
     """Two runs never write into one case, nor one beside a daemon that was started by hand. Yields the lock,
-    which solver and daemon hold too: should this process be killed, the next run waits for their end."""
+    which solver and daemon hold too: should this process be killed, the next run is refused until they have ended."""
     with locked(case, RUN) as lock:
         with locked(case, DAEMON):
             pass

@@ -186,7 +186,7 @@ class _Run:
         velocity, extra = self._sample()
         self.fleet.observe(self.fleet.time, velocity, extra)
         if not self.fleet.provisional:
-            self.fleet.check_prediction(velocity, self.step)
+            self.gap = self.fleet.check_prediction(velocity, self.step)
 
     def _advance(self) -> None:
         self.solver.advance(1)
@@ -213,7 +213,7 @@ class _Run:
         mean = self.solver.coefficients[:, 0, 0, 0].real
         row = (time, energy, balance, dissipation, dissipation, u, reynolds, eta, coefficient, power, *mean)
         self.flow_table.write("\t".join(f"{x:.12g}" for x in row) + "\n")
-        self.table.add(time, self.step, 0.0, 0.0, fleet.prediction_gap, fleet.end_to_end_ratio())
+        self.table.add(time, self.step, 0.0, 0.0, self.gap, fleet.end_to_end_ratio())
         if self.step % self.scene.record_interval == 0:
             self.recorder.append(self.step, time, fleet.by_family)
 

@@ -15,17 +15,18 @@ from .times import STATE_FILE, Start, move_aside, time_folders
 def prepare(scene: Scene, start: Start, ranks: int) -> None:
     """Mesh and initial fields where the case does not have them, decomposed for this many ranks."""
     case = scene.case
-    mesh = _newest(case / "constant/polyMesh/points", case / "constant/polyMesh/points.gz")
     if not start.continues:
-        if (case / "system/blockMeshDict").is_file() and mesh < _newest(case / "system/blockMeshDict"):
+        if _mesh_time(case) < _newest(case / "system/blockMeshDict"):
             utility(case, "blockMesh")
         initial_fields(scene)
-    elif not mesh:
-        raise CaseError(f"{case} has no mesh (constant/polyMesh)")
-    if not _newest(case / "constant/polyMesh/points", case / "constant/polyMesh/points.gz"):
+    if not _mesh_time(case):
         raise CaseError(f"{case} has no mesh (constant/polyMesh) and no system/blockMeshDict to make one")
     (case / f"{case.name}.foam").touch()  # ParaView opens the case by this name
     _decompose(case, start, ranks)
+
+
+def _mesh_time(case: Path) -> float:
+    return _newest(case / "constant/polyMesh/points", case / "constant/polyMesh/points.gz")
 
 
 def _newest(*files: Path) -> float:

@@ -20,7 +20,7 @@ from .. import __version__
 from ..case.dictionary import CaseError
 from ..case.lock import DAEMON, locked
 from ..case.scene import Family, Scene, read_scene
-from ..case.times import STATE_FILE
+from ..case.times import STATE_FILE, as_time
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
 from .channel import Channel, CouplingError, Listener, listen
@@ -288,10 +288,8 @@ def states(case: Path) -> dict[float, Path]:
     for pattern in ("processor0/*", "*"):
         for path in case.glob(f"{pattern}/{STATE_FILE}"):
             folder = path.parent.parent
-            try:
-                found[float(folder.name)] = folder
-            except ValueError:
-                continue
+            if (time := as_time(folder.name)) is not None:
+                found[time] = folder
     return found
 
 

@@ -16,6 +16,7 @@ from ..case.dictionary import CaseError
 from ..case.scene import Family, Scene
 from ..case.times import STATE_FILE
 from ..fiber import Fibers, Stepper
+from ..statistics.fibers import end_to_end_squared_ratio
 from .message import NEEDS
 
 log = logging.getLogger(__name__)
@@ -138,11 +139,8 @@ class Fleet:
 
     def end_to_end_ratio(self) -> list[float]:
         """<R^2>/L^2 of each family, L = 2a(N - 1) between the end beads' centres."""
-        ratios = []
-        for family, x in zip(self.families, self.by_family, strict=True):
-            contour = 2 * family.radius * (family.beads - 1)
-            ratios.append(float(np.mean(np.sum((x[:, -1] - x[:, 0]) ** 2, axis=-1)) / contour**2))
-        return ratios
+        pairs = zip(self.families, self.by_family, strict=True)
+        return [float(end_to_end_squared_ratio(x, family.radius).mean()) for family, x in pairs]
 
     def _signature(self) -> str:
         return json.dumps([[f.name, f.count, f.beads, f.length] for f in self.families])
