@@ -7,9 +7,12 @@ import json
 import logging
 import signal
 import sys
+from importlib import import_module
 from pathlib import Path
 
 from . import __version__
+
+STUDIES = ("convergence",)  # modules of validation/, each with run, table and draw
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -87,15 +90,17 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("info", _info, "Say what a case contains and whether the fiber model holds in it. SI units.")
     add_case(sub)
     _add_json(sub)
-    sub = add("validate", _validate, "Converge OpenFOAM with a case's schemes to the spectral solver.")
+    sub = add("validate", _validate, "Judge OpenFOAM with a case's schemes by the spectral solver.")
     add_case(sub)
-    sub.add_argument("--cells", type=int, nargs="+", default=[24, 32, 48, 64], help="(default: 24 32 48 64)")
     sub.add_argument(
-        "--time-step", type=float, default=0.04, help="of the first, in proportion for the others [s]"
+        "--study",
+        choices=STUDIES,
+        default="convergence",
+        help="convergence: errors of flow and fibers as cells and step shrink (default)",
     )
-    sub.add_argument(
-        "--figure", metavar="PNG", help="also draw the errors against cells and against time spent"
-    )
+    sub.add_argument("--cells", type=int, nargs="+", help="in each direction (default: as the study needs)")
+    sub.add_argument("--time-step", type=float, help="of the first, in proportion for the others [s]")
+    sub.add_argument("--figure", metavar="PNG", help="also draw the result")
     _add_json(sub)
 
     sub = add("bench", None, "Measure speed beside error; ratios within one run.")
@@ -174,16 +179,15 @@ def _info(arguments) -> dict:
 
 
 def _validate(arguments) -> dict:
-    from .validate import table, validate
-
-    result = validate(arguments.case, arguments.cells, arguments.time_step)
-    print(table(result))
+    study = import_module(f".validation.{arguments.study}", __package__)
+    given = {name: getattr(arguments, name) for name in ("cells", "time_step")}
+    result = study.run(arguments.case, **{name: value for name, value in given.items() if value is not None})
+    print(study.table(result))
     if arguments.figure:
-        from .output.figures import convergence_figure
         from .output.style import styled
 
         with styled():
-            convergence_figure(result["rows"]).savefig(arguments.figure)
+            study.draw(result).savefig(arguments.figure)
     return result
 
 

@@ -1,19 +1,25 @@
-"""`gbm validate`: one case in both engines at several resolutions, and how fast OpenFOAM and its fibers
-converge to the spectral solver, which resolves the same initial modes exactly."""
+"""`gbm validate --study convergence`: one case in both engines at several resolutions.
+
+How fast OpenFOAM and its fibers converge to the spectral solver, which resolves the same initial modes exactly.
+"""
 
 from __future__ import annotations
 
 import itertools
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from .case.copies import HEADER, copy_case
-from .output.field import read_velocity
-from .output.recording import open_recording
-from .run import run, run_spectral
+from ..case.copies import HEADER, copy_case
+from ..output.field import read_velocity
+from ..output.figures import convergence_figure
+from ..output.recording import open_recording
+from ..run import run as run_openfoam
+from ..run import run_spectral
 
 FLOW = """field random; spectrum table; table ((1 0.08) (2 0.12) (3 0.05)); seed {seed};
 """
@@ -34,12 +40,14 @@ END_TIME = 1.2  # half a turnover: k/eps of this flow, at its start, is 2.5 s
 VISCOSITY = 0.03  # Kolmogorov length 0.15: 24 cells are 1.8 of it wide
 
 
-def validate(case: Path | str, cells: list[int], time_step: float, seed: int = 1) -> dict:
+def run(
+    case: Path | str, cells: Sequence[int] = (24, 32, 48, 64), time_step: float = 0.04, seed: int = 1
+) -> dict:
     """Errors of OpenFOAM against the spectral solver at the same time.
 
     case: whose schemes and solver settings are judged. time_step: that of the coarsest mesh [s]; finer ones
     take it in proportion to their cells. Velocity: rms difference at the cell centres over the rms velocity.
-    Fibers: rms difference of the end beads over the fiber length, for each family. Raises as `run.run`.
+    Fibers: rms difference of the end beads over the fiber length, for each family. Raises as `gbm_plugin.run.run`.
     """
     if len(set(cells)) < len(cells) or any(n < 8 or n % 2 for n in cells):
         raise ValueError(f"cells are {cells}; allowed: even numbers of at least 8, each once")
@@ -56,7 +64,7 @@ def validate(case: Path | str, cells: list[int], time_step: float, seed: int = 1
 def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
     _make(case, copy, n, steps, seed)
     seconds = {}
-    for engine, function in (("openfoam", run), ("spectral", run_spectral)):
+    for engine, function in (("openfoam", run_openfoam), ("spectral", run_spectral)):
         words = FIBERS.format(steps=steps, interpolation="trilinear" if engine == "openfoam" else "exact")
         (copy / "constant/fiberProperties").write_text(HEADER + words)
         start = time.perf_counter()
@@ -119,7 +127,7 @@ def _orders(rows: list[dict]) -> list[dict]:
 
 
 def table(result: dict) -> str:
-    """The result of `validate` as text."""
+    """The result of `run` as text."""
     errors = [name for name in result["rows"][0] if name.endswith("_error")]
     head = "cells   step [s]" + "".join(f"{e.removesuffix('_error'):>12}" for e in errors)
     lines = [head + "   OpenFOAM [s]   spectral [s]"]
@@ -129,3 +137,8 @@ def table(result: dict) -> str:
     for order in result["orders"]:
         lines.append("  order" + 9 * " " + "".join(f"{order[e]:12.2f}" for e in errors))
     return "\n".join(lines)
+
+
+def draw(result: dict) -> Figure:
+    """The errors against cells and against time spent."""
+    return convergence_figure(result["rows"])
