@@ -82,6 +82,12 @@ def _parser() -> argparse.ArgumentParser:
 
     sub = add("daemon", _daemon, "Move the fibers of a case for a solver that is started by hand.")
     add_case(sub)
+    sub.add_argument(
+        "--share",
+        type=int,
+        metavar="K",
+        help="which daemon this is, 1 ... daemons, of several that share the fibers",
+    )
 
     sub = add("report", _report, "Write figures, tables and ParaView files of a run into CASE/report.")
     add_case(sub)
@@ -160,7 +166,7 @@ def _run(arguments) -> None:
 def _daemon(arguments) -> None:
     from .coupling.daemon import serve
 
-    serve(arguments.case)
+    serve(arguments.case, arguments.share)
 
 
 def _report(arguments) -> dict:

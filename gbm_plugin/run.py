@@ -19,6 +19,7 @@ from .case.log import summary
 from .case.openfoam import command, environment, fatal_message
 from .case.prepare import prepare, ranks_of, reconstruct
 from .case.scene import Scene, read_scene
+from .case.share import Share, all_shares
 from .case.times import choose_start
 from .output.progress import Progress
 from .output.restarts import keep_earlier
@@ -52,7 +53,7 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
         start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)
         prepare(scene, start, ranks)
         _remove_addresses(case)
-        _Pair(scene, ranks, start.time, lock).run()
+        _Processes(scene, ranks, start.time, lock).run()
         if ranks > 1:
             reconstruct(case)
 
@@ -72,64 +73,77 @@ def _only_run(case: Path) -> Iterator[int]:
     """Two runs never write into one case, nor one beside a daemon that was started by hand. Yields the lock,
     which solver and daemon hold too: should this process be killed, the next run is refused until they have ended."""
     with locked(case, RUN) as lock:
-        with locked(case, DAEMON):
-            pass
+        for file in case.glob(f".gbm.{DAEMON}*.lock"):
+            with locked(case, file.name.removeprefix(".gbm.").removesuffix(".lock")):
+                pass
         yield lock
 
 
 def _remove_addresses(case: Path) -> None:
-    """Addresses that a killed daemon left."""
-    for name in ("gbm.tcp", "exchange/session"):
-        (case / name).unlink(missing_ok=True)
+    """Addresses that killed daemons left."""
+    for pattern in ("gbm*.tcp", "exchange*/session"):
+        for path in case.glob(pattern):
+            path.unlink()
 
 
-class _Pair:
-    """The two processes of a run."""
+class _Daemon:
+    """One daemon of a run: its process and its log."""
+
+    def __init__(self, case: Path, share: Share):
+        self.share = share
+        self.log = case / share.name("log.gbmDaemon")
+        # -P: not a folder gbm_plugin that happens to be here
+        self.argv = [sys.executable, "-P", "-m", "gbm_plugin.cli", "daemon", str(case)]
+        if share.of > 1:
+            self.argv += ["--share", str(share.number)]
+        self.process: subprocess.Popen | None = None
+
+
+class _Processes:
+    """The solver and the daemons of a run."""
 
     def __init__(self, scene: Scene, ranks: int, start_time: float, lock: int):
         self.scene = scene
         self.case = scene.case
         self.ranks = ranks
         self.start_time = start_time
-        self.daemon_log = self.case / "log.gbmDaemon"
+        self.daemons = [_Daemon(self.case, share) for share in all_shares(scene.coupling.daemons)]
         self.solver_log = self.case / f"log.{scene.application}"
         self.lock = lock
-        self.daemon: subprocess.Popen | None = None
         self.solver: subprocess.Popen | None = None
         self.stopping = 0
-        self.ended_here: set[subprocess.Popen] = set()  # by this process, after the other side's end
+        self.ended_here: set[subprocess.Popen] = set()  # by this process, after another one's end
 
     def run(self) -> None:
-        # in sessions of their own: Ctrl-C reaches this process alone, which then ends both in order
-        daemon = [sys.executable, "-P", "-m", "gbm_plugin.cli", "daemon", str(self.case)]
+        # in sessions of their own: Ctrl-C reaches this process alone, which then ends all in order
         solver = command(self.scene.application, self.case, self.ranks)
         handlers = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
-        for path in (self.daemon_log, self.solver_log):
-            keep_earlier(path)
+        # the cores that the solver leaves; one that they share, if it leaves none
+        cores = max(1, (len(os.sched_getaffinity(0)) - self.ranks) // len(self.daemons))
         try:
-            with self.daemon_log.open("w") as d, self.solver_log.open("w") as s:
-                # the cores that the solver leaves; one that they share, if it leaves none
-                cores = max(1, len(os.sched_getaffinity(0)) - self.ranks)
-                self.daemon = self._start(daemon, d, NUMBA_NUM_THREADS=str(cores))
-                self.solver = self._start(solver, s)
-                self._watch()
+            for daemon in self.daemons:
+                daemon.process = self._start(daemon.argv, daemon.log, NUMBA_NUM_THREADS=str(cores))
+            self.solver = self._start(solver, self.solver_log)
+            self._watch()
         finally:
             for number, handler in handlers.items():
                 signal.signal(number, handler)
-            for process in filter(None, (self.solver, self.daemon)):
+            for process in filter(None, (self.solver, *(d.process for d in self.daemons))):
                 self._end(process)
         self._judge()
 
-    def _start(self, argv: list[str], output, **variables: str) -> subprocess.Popen:
-        return subprocess.Popen(
-            argv,
-            env=environment() | variables,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            pass_fds=(self.lock,),
-        )
+    def _start(self, argv: list[str], log_file: Path, **variables: str) -> subprocess.Popen:
+        keep_earlier(log_file)
+        with log_file.open("w") as output:
+            return subprocess.Popen(
+                argv,
+                env=environment() | variables,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                pass_fds=(self.lock,),
+            )
 
     def _end(self, process: subprocess.Popen) -> None:
         """The process and all that it started are gone when this returns."""
@@ -146,23 +160,25 @@ class _Pair:
         self.stopping += 1
         if self.stopping == 1:
             log.info("stopping: the flow is written after the step under way (once more: at once)")
-            if self.daemon is not None:
-                self.daemon.terminate()  # which asks OpenFOAM to write and end
+            for daemon in self.daemons:
+                if daemon.process is not None:
+                    daemon.process.terminate()  # which asks OpenFOAM to write and end
         elif self.solver is not None:
             self.solver.terminate()
 
     def _watch(self) -> None:
-        """Until both have ended, or one has outlived the other for too long."""
+        """Until all have ended, or one has outlived another for too long."""
+        everyone = [self.solver, *(d.process for d in self.daemons)]
         alone_since = None
         with Progress(self.scene, self.start_time) as progress:
-            while self.solver.poll() is None or self.daemon.poll() is None:
+            while any(process.poll() is None for process in everyone):
                 time.sleep(0.1)
                 progress.update()
-                if self.solver.poll() is None and self.daemon.poll() is None:
+                if all(process.poll() is None for process in everyone):
                     continue
                 if alone_since is None:
                     alone_since = time.monotonic()
-                    failed = (self.solver.poll() or 0) or (self.daemon.poll() or 0)
+                    failed = any(process.poll() for process in everyone)
                     grace = GRACE if failed else self.scene.coupling.timeout
                     if failed:
                         self._dismiss()
@@ -172,38 +188,43 @@ class _Pair:
 
     def _dismiss(self) -> None:
         """End at once who would only wait for a partner that does not come."""
-        if self.solver.poll() and self.daemon.poll() is None:  # in a session it merely asks for the end
-            self.ended_here.add(self.daemon)
-            self.daemon.terminate()
-        elif self.stopping and self.solver.poll() is None:
-            self.ended_here.add(self.solver)
-            self.solver.terminate()
+        if self.solver.poll():
+            left = [d.process for d in self.daemons if d.process.poll() is None]
+        else:
+            left = [self.solver] if self.stopping and self.solver.poll() is None else []
+        for process in left:  # a daemon in a session is merely asked for the end
+            self.ended_here.add(process)
+            process.terminate()
 
     def _judge(self) -> None:
-        solver, daemon = self.solver.returncode, self.daemon.returncode
+        solver = self.solver.returncode
         problem = fatal_message(self.solver_log)
-        if solver == 0 and daemon == 0:
+        if not any((solver, *(d.process.returncode for d in self.daemons))):
             if self.stopping:
                 raise RunError(STOPPED)
             log.info("%s: %s", self.scene.application, summary(self.solver_log))
             return
         if self.stopping and not problem:
             raise RunError("stopped at once; the same command continues from the latest time that is written")
-        daemon_problem = _last_error(self.daemon_log)
         name = self.scene.application
         causes = []
         # one that was ended here is not the cause
         if solver < 0 and not problem and self.solver not in self.ended_here:
             causes.append(f"{name} was ended by {signal.Signals(-solver).name} ({self.solver_log})")
-        if daemon < 0 and self.daemon not in self.ended_here:
-            causes.append(f"the daemon was ended by {signal.Signals(-daemon).name} ({self.daemon_log})")
-        if daemon_problem and (not problem or "the daemon stopped:" in problem):
-            causes.append(f"{daemon_problem} ({self.daemon_log})")
-        elif problem:
+        for d in self.daemons:
+            if d.process.returncode < 0 and d.process not in self.ended_here:
+                ended_by = signal.Signals(-d.process.returncode).name
+                causes.append(f"{d.share} was ended by {ended_by} ({d.log})")
+        errors = [(error, d.log) for d in self.daemons if (error := _last_error(d.log))]
+        if not problem or "the daemon stopped:" in problem:
+            causes += [f"{error} ({file})" for error, file in errors]
+        if problem and not (errors and "the daemon stopped:" in problem):
             causes.append(f"{name}: {problem} ({self.solver_log})")
         if not causes:
-            codes = f"{name} ended with exit code {solver}, the daemon with {daemon}"
-            causes.append(f"{codes} ({self.solver_log}, {self.daemon_log})")
+            codes = [f"{name} ended with exit code {solver}"]
+            codes += [f"{d.share} with {d.process.returncode}" for d in self.daemons]
+            logs = [str(self.solver_log), *(str(d.log) for d in self.daemons)]
+            causes.append(f"{', '.join(codes)} ({', '.join(logs)})")
         if shutil.disk_usage(self.case).free < FULL:
             causes.append(f"the disk of {self.case} is full")
         raise RunError("; ".join(causes))

@@ -9,7 +9,7 @@ from .dictionary import CaseError, Dictionary
 from .initial import is_made_here, read_initial_field, write_velocity
 from .openfoam import utility
 from .scene import Scene
-from .times import STATE_FILE, Start, move_aside, time_folders
+from .times import Start, fiber_state, move_aside, time_folders
 
 
 def prepare(scene: Scene, start: Start, ranks: int) -> None:
@@ -75,7 +75,7 @@ def reconstruct(case: Path) -> None:
     parts = case / "processor0"
     names = [n for n in time_folders(case).values() for u in ("U", "U.gz") if (parts / n / u).is_file()]
     # the state comes last, so a folder without it is what a killed reconstructPar left
-    cut = [n for n in names if (parts / n / STATE_FILE).is_file() and not (case / n / STATE_FILE).is_file()]
+    cut = [n for n in names if fiber_state(parts / n) and not fiber_state(case / n)]
     if left := [case / n for n in cut if (case / n).is_dir()]:
         move_aside(case, left)
     if any(not (case / n).is_dir() for n in names):

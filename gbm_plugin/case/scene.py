@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .dictionary import CaseError, Dictionary
+from .share import Share
 
 INTEGRATORS = ("ab3", "implicit", "auto")
 MOBILITIES = ("freeDrain", "rpy")
@@ -34,8 +35,8 @@ class Model:
 @dataclass(frozen=True)
 class Family:
     """Fibers that are alike but for their place: `count` fibers of `beads` beads, length 2 a N [m],
-    bending stiffness K^b [N m2]. positions (count, beads, 3) [m] where the case gives them, else None:
-    straight fibers at random."""
+    bending stiffness K^b [N m2]. positions (count, beads, 3) [m] of the whole family where the case gives them,
+    else None: straight fibers at random."""
 
     name: str
     count: int
@@ -46,6 +47,18 @@ class Family:
     shape: str
     model: Model
     positions: np.ndarray | None = field(default=None, repr=False, compare=False)
+    first: int = 0  # number of the first of these fibers in the whole family
+    whole: int = 0  # fibers of the whole family, where these are a part of it
+
+    @property
+    def total(self) -> int:
+        """Fibers of the whole family."""
+        return self.whole or self.count
+
+    def part(self, share: Share) -> Family:
+        """The fibers of one daemon."""
+        own = share.part(self.count)
+        return replace(self, count=own.stop - own.start, first=own.start, whole=self.count)
 
     @property
     def radius(self) -> float:
@@ -63,12 +76,13 @@ class Forcing:
 
 @dataclass(frozen=True)
 class Coupling:
-    """How OpenFOAM and the daemon talk; timeout in seconds."""
+    """How OpenFOAM and the daemons talk; timeout in seconds."""
 
     transport: str = "socket"
     timeout: float = 120.0
     host: str = "127.0.0.1"
     port: int = 0
+    daemons: int = 1  # that share the fibers
 
 
 @dataclass(frozen=True)
@@ -97,6 +111,10 @@ class Scene:
     def dynamic_viscosity(self) -> float:
         """mu = rho nu [Pa s]."""
         return self.density * self.viscosity
+
+    def part(self, share: Share) -> Scene:
+        """The scene of one daemon, with its part of every family."""
+        return replace(self, families=tuple(f.part(share) for f in self.families))
 
 
 def read_scene(case: Path | str) -> Scene:
@@ -137,6 +155,12 @@ def read_scene(case: Path | str) -> Scene:
         texts=_texts(case),
     )
     fibers.done()
+    for family in scene.families:
+        if family.count < scene.coupling.daemons:
+            raise CaseError(
+                f"{case}/constant/fiberProperties: {scene.coupling.daemons} daemons cannot share the {family.count} "
+                f"fibers of family {family.name}: each needs at least one"
+            )
     return scene
 
 
@@ -239,7 +263,12 @@ def _read_coupling(fibers: Dictionary) -> Coupling:
         timeout=d.number("timeout", 120.0, above=0),
         host=d.word("host", default="127.0.0.1"),
         port=d.integer("port", 0, least=0),
+        daemons=d.integer("daemons", 1, least=1),
     )
+    if coupling.port and coupling.daemons > 1:
+        raise d.fail(
+            "port", f"is one for {coupling.daemons} daemons; with several it must be 0, any free one"
+        )
     if coupling.port > 65535:
         raise d.fail("port", f"is {coupling.port}; allowed: 0 (any free one) to 65535")
     d.done()

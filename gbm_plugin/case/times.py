@@ -11,11 +11,12 @@ from pathlib import Path
 from PyFoam.RunDictionary.SolutionDirectory import SolutionDirectory
 
 from .dictionary import CaseError, Dictionary
+from .share import shared_files
 
 log = logging.getLogger(__name__)
 
 WHY = " (fields or fiber state are missing: killed while writing, or a full disk)"
-STATE_FILE = "uniform/fibers.npz"
+STATE_FILE = "uniform/fibers.npz"  # of a single daemon; of several: fibers.<number>of<daemons>.npz
 PREVIOUS = "previous"
 
 
@@ -27,11 +28,17 @@ def time_folders(case: Path) -> dict[float, str]:
     return {time: name for name in names if (time := as_time(name)) is not None}
 
 
+def fiber_state(folder: Path) -> list[Path]:
+    """The files of a time folder that hold the state of all fibers, one of each daemon; empty where one is missing."""
+    path = folder / STATE_FILE
+    return shared_files(path.parent, path.stem, path.suffix)
+
+
 def is_complete(case: Path, name: str) -> bool:
     """Whether a time folder holds whole fields and a fiber state, together or decomposed."""
     for folders in ([case / name], [p / name for p in case.glob("processor[0-9]*")]):
         velocity = folders and all(any((f / u).is_file() for u in ("U", "U.gz")) for f in folders)
-        state = any((f / STATE_FILE).is_file() for f in folders)
+        state = any(fiber_state(f) for f in folders)
         if velocity and state and all(_is_whole(file) for f in folders for file in f.iterdir()):
             return True
     return False

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..case.scene import Coupling
-from .message import HEADER_SIZE, MAX_TEXT, Kind, Message, ProtocolError, decode_header
+from ..case.share import WHOLE, Share
+from .message import HEADER_SIZE, MAX_TEXT, Kind, Message, ProtocolError, decode_header, encode_header
 
 
 class CouplingError(RuntimeError):
@@ -23,17 +24,17 @@ class Channel(ABC):
         self._log = log
 
     @abstractmethod
-    def _write(self, data: bytes) -> None: ...
+    def _write(self, head: bytes, payload: bytes | memoryview) -> None: ...
 
     @abstractmethod
-    def _read(self, size: int) -> bytes:
+    def _read(self, size: int) -> bytes | bytearray:
         """Exactly this many bytes; CouplingError at the end of the connection or the timeout."""
 
     @abstractmethod
     def close(self) -> None: ...
 
     def send(self, message: Message) -> None:
-        self._write(message.encode())
+        self._write(encode_header(message), message.payload)
 
     def receive(self, most: int = MAX_TEXT) -> Message:
         """The next message, of at most so many bytes. CouplingError where the solver is gone, silent, or
@@ -44,7 +45,7 @@ class Channel(ABC):
             raise self.error(str(error)) from None
         message = Message(head.kind, head.step, head.time, self._read(size), head.flags)
         if message.kind is Kind.ERROR:
-            raise self.error(f"OpenFOAM stopped: {message.payload.decode(errors='replace')}")
+            raise self.error(f"OpenFOAM stopped: {bytes(message.payload).decode(errors='replace')}")
         return message
 
     def error(self, what: str) -> CouplingError:
@@ -75,10 +76,11 @@ class Listener(ABC):
         self.close()
 
 
-def listen(case: Path, coupling: Coupling, log: Path) -> Listener:
-    """Open the way that the case's word `transport` names; log: the solver's, for messages."""
+def listen(case: Path, coupling: Coupling, log: Path, share: Share = WHOLE) -> Listener:
+    """Open the way that the case's word `transport` names; log: the solver's, for messages; share: whose of the
+    case's daemons."""
     from .files import FileListener
     from .sockets import TcpListener, UnixListener
 
     kinds = {"socket": UnixListener, "tcp": TcpListener, "file": FileListener}
-    return kinds[coupling.transport](case, coupling, log)
+    return kinds[coupling.transport](case, coupling, log, share)

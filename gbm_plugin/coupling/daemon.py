@@ -20,7 +20,8 @@ from .. import __version__
 from ..case.dictionary import CaseError
 from ..case.lock import DAEMON, locked
 from ..case.scene import Family, Scene, read_scene
-from ..case.times import STATE_FILE, as_time
+from ..case.share import Share
+from ..case.times import as_time, fiber_state
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
 from .channel import Channel, CouplingError, Listener, listen
@@ -45,21 +46,28 @@ log = logging.getLogger(__name__)
 HELLO_TIMEOUT = 5.0  # a solver says HELLO at once [s]
 
 
-def serve(case: Path | str) -> None:
+def serve(case: Path | str, number: int | None = None) -> None:
     """Serve one run of the solver in `case`, then return.
 
-    Raises CaseError for mistakes in the case, CouplingError where the solver fails, FloatingPointError for a
-    value that is not finite, OSError where a recording cannot be written.
+    number: which daemon this is, 1..., where the case has several that share the fibers. Raises CaseError for
+    mistakes in the case, CouplingError where the solver fails, FloatingPointError for a value that is not finite,
+    OSError where a recording cannot be written.
     """
     case = Path(case).resolve()
     scene = read_scene(case)
+    share = _share(scene, number)
+    scene = scene.part(share)
     stop = _StopFlag()
-    with locked(case, DAEMON), listen(case, scene.coupling, case / f"log.{scene.application}") as listener:
+    solver_log = case / f"log.{scene.application}"
+    with (
+        locked(case, share.name(DAEMON)),
+        listen(case, scene.coupling, solver_log, share) as listener,
+    ):
         log.info("waiting for OpenFOAM (%s)", scene.coupling.transport)
         while (channel := listener.accept(give_up=lambda: bool(stop))) is not None:
             try:
                 if (first := _greeted(channel, listener)) is not None:
-                    Session(scene, channel, stop).run(*first)
+                    Session(scene, share, channel, stop).run(*first)
                     return
             except Exception as error:
                 _say_why(channel, str(error))
@@ -67,6 +75,19 @@ def serve(case: Path | str) -> None:
             finally:
                 channel.close()
         raise CouplingError("stopped before OpenFOAM came")
+
+
+def _share(scene: Scene, number: int | None) -> Share:
+    daemons = scene.coupling.daemons
+    if number is None and daemons > 1:
+        raise CaseError(
+            f"{daemons} daemons share the fibers of {scene.case}: say which this is, --share 1 ... {daemons}"
+        )
+    if number is not None and not 1 <= number <= daemons:
+        raise CaseError(
+            f"--share {number}: {scene.case}/constant/fiberProperties has daemons {daemons}; allowed: 1 ... {daemons}"
+        )
+    return Share(number or 1, daemons)
 
 
 def _greeted(channel: Channel, listener: Listener) -> tuple[Message, Hello] | None:
@@ -118,8 +139,9 @@ def _say_why(channel: Channel, text: str) -> None:
 class Session:
     """One run of the solver, from HELLO to GOODBYE."""
 
-    def __init__(self, scene: Scene, channel: Channel, stop: _StopFlag):
+    def __init__(self, scene: Scene, share: Share, channel: Channel, stop: _StopFlag):
         self.scene = scene
+        self.share = share
         self.channel = channel
         self.stop = stop
 
@@ -129,7 +151,7 @@ class Session:
         self.time_step = hello.time_step
         self.fleet = self._fibers(hello)
         self.recorder = self._recorder(hello, first.time)
-        self.table = StepTable(self.recorder.path.parent, self.scene.families)
+        self.table = StepTable(self.recorder.path.parent, self.scene.families, self.share)
         welcome = encode_welcome(self.fleet.need, self.fleet.sizes)
         self.channel.send(Message(Kind.WELCOME, self.step, self.time, welcome))
         try:
@@ -150,6 +172,11 @@ class Session:
 
     def _check(self, hello: Hello) -> None:
         """Compare what OpenFOAM runs with to the case that this daemon read."""
+        if hello.share != self.share:
+            raise self.channel.error(
+                f"OpenFOAM takes this for {hello.share}, and it is {self.share}: the entry 'daemons' of "
+                f"{self.scene.case}/constant/fiberProperties was edited in between"
+            )
         pairs = [
             ("nu", hello.viscosity, self.scene.viscosity),
             ("deltaT", hello.time_step, self.scene.time_step),
@@ -170,7 +197,7 @@ class Session:
 
     def _fibers(self, hello: Hello) -> Fleet:
         """New fibers, or those of the time folder that OpenFOAM starts from."""
-        fleet = Fleet.seeded(self.scene, hello.box_min, hello.box_max, self.time)
+        fleet = Fleet.seeded(self.scene, hello.box_min, hello.box_max, self.time, self.share)
         folder = find_state(self.scene.case, hello.folder)
         if folder is None:
             earlier = sorted(t for t in states(self.scene.case) if t < self.time)
@@ -184,15 +211,15 @@ class Session:
         else:
             fleet.restore(folder)
             if abs(fleet.time - self.time) > 1e-6 * self.time_step:
-                raise CaseError(f"{folder / STATE_FILE} is of time {fleet.time:g}, not {self.time:g}")
+                raise CaseError(f"the fiber state in {folder} is of time {fleet.time:g}, not {self.time:g}")
             self.time = fleet.time
-            log.info("time %g: fibers continue from %s", self.time, folder / STATE_FILE)
+            log.info("time %g: fibers continue from %s", self.time, fiber_state(folder)[0])
         return fleet
 
     def _recorder(self, hello: Hello, start: float) -> Recorder:
         folder = self.scene.case / "postProcessing/fibers" / Path(hello.folder).name
         return Recorder(
-            keep_earlier(folder / "fibers.h5"),
+            keep_earlier(folder / self.share.name("fibers", ".h5")),
             [family_record(f) for f in self.scene.families],
             box_origin=hello.box_min,
             box_size=np.subtract(hello.box_max, hello.box_min),
@@ -286,9 +313,8 @@ def states(case: Path) -> dict[float, Path]:
     """Time folders of the case, serial or decomposed, that hold a complete fiber state."""
     found = {}
     for pattern in ("processor0/*", "*"):
-        for path in case.glob(f"{pattern}/{STATE_FILE}"):
-            folder = path.parent.parent
-            if (time := as_time(folder.name)) is not None:
+        for folder in case.glob(pattern):
+            if (time := as_time(folder.name)) is not None and fiber_state(folder):
                 found[time] = folder
     return found
 
@@ -297,6 +323,6 @@ def find_state(case: Path, folder: str) -> Path | None:
     """Where the state of this time folder is: there, or in the other of the serial and decomposed ones."""
     name = Path(folder).name
     for candidate in (case / folder, case / name, case / "processor0" / name):
-        if (candidate / STATE_FILE).is_file():
+        if fiber_state(candidate):
             return candidate
     return None

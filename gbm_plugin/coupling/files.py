@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..case.scene import Coupling
+from ..case.share import Share
 from .channel import Channel, CouplingError, Listener
 from .message import HEADER_SIZE, MAX_TEXT, Message
 from .sockets import POLL, write_secret
@@ -29,11 +30,13 @@ class FileChannel(Channel):
     def incoming(self) -> Path:
         return self._folder / f"{self._session}.flow.{self._received}"
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, head: bytes, payload: bytes | memoryview) -> None:
         target = self._folder / f"{self._session}.fibers.{self._sent}"
         part = target.with_name(target.name + ".part")
         try:
-            part.write_bytes(data)
+            with part.open("wb") as file:
+                file.write(head)
+                file.write(payload)
             os.replace(part, target)
         except OSError as error:
             raise self.error(f"cannot write {target}: {error.strerror}") from None
@@ -79,10 +82,10 @@ class FileChannel(Channel):
 class FileListener(Listener):
     """Owns `exchange`: a new session word tells messages of this run from stale ones, which it removes."""
 
-    def __init__(self, case: Path, coupling: Coupling, log: Path):
+    def __init__(self, case: Path, coupling: Coupling, log: Path, share: Share):
         self.log = log
         self.timeout = coupling.timeout
-        self.folder = case / "exchange"
+        self.folder = case / share.name("exchange")
         self.session = secrets.token_hex(8)
         try:
             self.folder.mkdir(mode=0o700, exist_ok=True)

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..case.dictionary import CaseError
 from ..case.scene import Family, Scene
-from ..case.times import STATE_FILE
-from ..fiber import Fibers, Stepper
+from ..case.share import WHOLE, Share
+from ..case.times import STATE_FILE, fiber_state
+from ..fiber import Fibers, Stepper, merged_states
 from ..statistics.fibers import end_to_end_squared_ratio
 from .message import NEEDS
 
@@ -32,16 +33,21 @@ class Fleet:
     `fiber.Stepper`.
     """
 
-    def __init__(self, families: Sequence[Family], steppers: Sequence[Stepper]):
+    def __init__(self, families: Sequence[Family], steppers: Sequence[Stepper], share: Share = WHOLE):
         self.families = tuple(families)
+        self.share = share
         self.steppers = tuple(steppers)
         ends = np.cumsum([f.count * f.beads for f in families])
         self._slices = [slice(e - f.count * f.beads, e) for e, f in zip(ends, families, strict=True)]
         self.beads = int(ends[-1])
+        self._positions: np.ndarray | None = None
 
     @classmethod
-    def seeded(cls, scene: Scene, box_min, box_max, time: float) -> Fleet:
-        """New fibers, at random places and orientations in the box unless the case gives their positions."""
+    def seeded(cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE) -> Fleet:
+        """New fibers, at random places and orientations in the box unless the case gives their positions.
+
+        share: whose part of the families the scene has; their fibers are those that they are in the whole.
+        """
         size = np.subtract(box_max, box_min)
         steppers = []
         for f in scene.families:
@@ -49,10 +55,10 @@ class Fleet:
             made_of = (f.bending_stiffness, scene.dynamic_viscosity)
             positions = f.positions
             if positions is None:
-                straight = Fibers.straight(f.count, f.beads, f.length, *made_of, box=size, seed=f.seed)
+                straight = Fibers.straight(f.total, f.beads, f.length, *made_of, box=size, seed=f.seed)
                 positions = straight.positions + box_min
             try:
-                fibers = Fibers(positions, *made_of, **words)
+                fibers = Fibers(positions, *made_of, **words).part(slice(f.first, f.first + f.count))
             except ValueError as error:
                 raise CaseError(f"family {f.name} in constant/fiberProperties: {error}") from None
             steppers.append(
@@ -66,7 +72,7 @@ class Fleet:
                     repulsion=f.model.repulsion,
                 )
             )
-        return cls(scene.families, steppers)
+        return cls(scene.families, steppers, share)
 
     @property
     def time(self) -> float:
@@ -78,17 +84,23 @@ class Fleet:
         return max((s.need for s in self.steppers), key=NEEDS.index)
 
     @property
-    def sizes(self) -> list[tuple[int, int]]:
-        return [(f.count, f.beads) for f in self.families]
+    def sizes(self) -> list[tuple[int, int, int]]:
+        """Fibers, beads of each, and number of the first fiber, of each family."""
+        return [(f.count, f.beads, f.first) for f in self.families]
 
     @property
     def positions(self) -> np.ndarray:
-        return np.concatenate([s.positions.reshape(-1, 3) for s in self.steppers])
+        """(B, 3), to be read only."""
+        if self._positions is None:
+            self._positions = np.concatenate([s.positions.reshape(-1, 3) for s in self.steppers])
+            self._positions.flags.writeable = False
+        return self._positions
 
     @property
     def by_family(self) -> list[np.ndarray]:
         """Positions (count, beads, 3) of each family."""
-        return [s.positions for s in self.steppers]
+        parts = zip(self.families, self._slices, strict=True)
+        return [self.positions[part].reshape(f.count, f.beads, 3) for f, part in parts]
 
     def observe(self, time: float, velocity: np.ndarray, extra: np.ndarray | None) -> None:
         for family, stepper, part in zip(self.families, self.steppers, self._slices, strict=True):
@@ -100,6 +112,7 @@ class Fleet:
             )
 
     def advance(self, time_step: float) -> None:
+        self._positions = None
         for s in self.steppers:
             s.advance(time_step)
 
@@ -108,6 +121,7 @@ class Fleet:
         return any(s.provisional for s in self.steppers)
 
     def correct(self) -> None:
+        self._positions = None
         for s in self.steppers:
             if s.provisional:
                 s.correct()
@@ -143,7 +157,7 @@ class Fleet:
         return [float(end_to_end_squared_ratio(x, family.radius).mean()) for family, x in pairs]
 
     def _signature(self) -> str:
-        return json.dumps([[f.name, f.count, f.beads, f.length] for f in self.families])
+        return json.dumps([[f.name, f.total, f.beads, f.length] for f in self.families])
 
     def save(self, folder: Path, step: int, time: float) -> None:
         """Write the whole state into a time folder; the file appears only when it is complete."""
@@ -155,6 +169,7 @@ class Fleet:
         buffer = io.BytesIO()
         np.savez(buffer, signature=self._signature(), step=step, time=time, **arrays)
         path = folder / STATE_FILE
+        path = path.with_name(self.share.name(path.stem, path.suffix))
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_suffix(".part")
         with part.open("wb") as file:
@@ -164,25 +179,36 @@ class Fleet:
         os.replace(part, path)
 
     def restore(self, folder: Path) -> None:
-        """Continue from the state in a time folder. ValueError where it is of other fibers or unreadable."""
-        path = folder / STATE_FILE
+        """Continue from the state in a time folder, whatever daemons shared it. ValueError where it is of other
+        fibers or unreadable."""
+        self._positions = None
+        paths = fiber_state(folder)
+        states = [self._read_state(path) for path in paths]
+        for family, stepper in zip(self.families, self.steppers, strict=True):
+            prefix = f"{family.name}/"
+            own = [
+                {key.removeprefix(prefix): value for key, value in state.items() if key.startswith(prefix)}
+                for state in states
+            ]
+            try:
+                stepper.restore(merged_states(own, slice(family.first, family.first + family.count)))
+            except (KeyError, ValueError) as error:
+                raise CaseError(f"the fiber state {paths[0]} cannot be read: {error}") from None
+
+    def _read_state(self, path: Path) -> dict[str, np.ndarray]:
         try:
             with np.load(path) as data:
-                if str(data["signature"]) != self._signature():
-                    raise CaseError(
-                        f"{path} holds the families {data['signature']} (name, count, beads, length), "
-                        f"constant/fiberProperties says {self._signature()}: "
-                        "restore the dictionary, or start afresh"
-                    )
-                for family, stepper in zip(self.families, self.steppers, strict=True):
-                    prefix = f"{family.name}/"
-                    stepper.restore(
-                        {k.removeprefix(prefix): data[k] for k in data.files if k.startswith(prefix)}
-                    )
-        except CaseError:
-            raise
+                state = {key: data[key] for key in data.files}
+            signature = str(state["signature"])
         except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
             raise CaseError(f"the fiber state {path} cannot be read: {error}") from None
+        if signature != self._signature():
+            raise CaseError(
+                f"{path} holds the families {signature} (name, count, beads, length), "
+                f"constant/fiberProperties says {self._signature()}: "
+                "restore the dictionary, or start afresh"
+            )
+        return state
 
 
 def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int, int]) -> np.ndarray | None:

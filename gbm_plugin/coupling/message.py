@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..case.share import Share
+
 MAGIC = b"GBMC"
-VERSION = 1
+VERSION = 2
 MAX_TEXT = 65536  # longest payload of all but POSITIONS and SAMPLE [bytes]
 
 _HEADER = struct.Struct("<4sHHIIqdQ")
@@ -41,11 +43,11 @@ class Message:
     kind: Kind
     step: int
     time: float
-    payload: bytes = b""
+    payload: bytes | memoryview = b""
     flags: int = 0
 
     def encode(self) -> bytes:
-        return encode_header(self) + self.payload
+        return encode_header(self) + bytes(self.payload)
 
 
 def encode_header(m: Message) -> bytes:
@@ -78,29 +80,35 @@ def decode_header(data: bytes, most: int = MAX_TEXT) -> tuple[Message, int]:
 
 @dataclass(frozen=True)
 class Hello:
-    """The values that OpenFOAM runs with. SI units; folder: of the start time, relative to the case."""
+    """The values that OpenFOAM runs with, and which of the daemons it takes this one for. SI units; folder: of the
+    start time, relative to the case."""
 
     viscosity: float
     time_step: float
     box_min: tuple[float, float, float]
     box_max: tuple[float, float, float]
     cells: int
+    share: Share
     folder: str
     token: str
 
-    _FIXED = struct.Struct("<9dq")
+    _FIXED = struct.Struct("<9d3q")
 
     def encode(self) -> bytes:
         folder = self.folder.encode()
         values = (self.viscosity, self.time_step, *self.box_min, *self.box_max, float(self.cells))
-        return self._FIXED.pack(*values, len(folder)) + folder + self.token.encode()
+        return (
+            self._FIXED.pack(*values, self.share.number, self.share.of, len(folder))
+            + folder
+            + self.token.encode()
+        )
 
     @classmethod
     def decode(cls, payload: bytes) -> Hello:
         size = cls._FIXED.size
         if len(payload) < size:
             raise ProtocolError(f"HELLO has {len(payload)} bytes: at least {size} are needed")
-        *values, length = cls._FIXED.unpack(payload[:size])
+        *values, number, of, length = cls._FIXED.unpack(payload[:size])
         if not all(map(math.isfinite, values)) or not 0 <= length <= len(payload) - size:
             raise ProtocolError("HELLO holds values that are not finite, or a folder that is cut off")
         folder = decode_folder(payload[size : size + length])
@@ -108,9 +116,10 @@ class Hello:
             token = payload[size + length :].decode()
         except UnicodeDecodeError:
             raise ProtocolError("HELLO holds a token that is not UTF-8") from None
-        return cls(
-            values[0], values[1], tuple(values[2:5]), tuple(values[5:8]), int(values[8]), folder, token
-        )
+        if not 1 <= number <= of:
+            raise ProtocolError(f"HELLO is for daemon {number} of {of}")
+        low, high = tuple(values[2:5]), tuple(values[5:8])
+        return cls(values[0], values[1], low, high, int(values[8]), Share(number, of), folder, token)
 
 
 def decode_folder(data: bytes) -> str:
@@ -124,14 +133,15 @@ def decode_folder(data: bytes) -> str:
 NEEDS = ("velocity", "rotation", "gradient")
 
 
-def encode_welcome(need: str, families: list[tuple[int, int]]) -> bytes:
-    """need: what to sample; families: (count, beads) of each."""
+def encode_welcome(need: str, families: list[tuple[int, int, int]]) -> bytes:
+    """need: what to sample; families: fibers, beads of each, and number of the first fiber, of each family."""
     flat = [n for family in families for n in family]
     return struct.pack(f"<{2 + len(flat)}q", NEEDS.index(need), len(families), *flat)
 
 
-def encode_array(values: np.ndarray) -> bytes:
-    return np.ascontiguousarray(values, dtype="<f8").tobytes()
+def encode_array(values: np.ndarray) -> memoryview:
+    """The bytes of an array, which is not copied where it is contiguous."""
+    return memoryview(np.ascontiguousarray(values, dtype="<f8")).cast("B")
 
 
 def sample_size(beads: int, need: str) -> int:

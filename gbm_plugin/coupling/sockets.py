@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..case.scene import Coupling
+from ..case.share import Share
 from .channel import Channel, CouplingError, Listener
 from .message import Kind, Message
 
@@ -51,33 +52,34 @@ class SocketChannel(Channel):
             second.sendall(Message(Kind.ERROR, 0, 0.0, text).encode())
             _part(second)
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, head: bytes, payload: bytes | memoryview) -> None:
         deadline = time.monotonic() + self.timeout
+        for view in (memoryview(head), memoryview(payload)):
+            while view:
+                self._wait(select.POLLOUT, deadline)
+                try:
+                    view = view[self._socket.send(view) :]
+                except BlockingIOError:
+                    continue
+                except OSError as error:
+                    raise self.error(f"OpenFOAM is gone: {error.strerror}") from None
+
+    def _read(self, size: int) -> bytearray:
+        deadline = time.monotonic() + self.timeout
+        data = bytearray(size)
         view = memoryview(data)
         while view:
-            self._wait(select.POLLOUT, deadline)
-            try:
-                view = view[self._socket.send(view) :]
-            except BlockingIOError:
-                continue
-            except OSError as error:
-                raise self.error(f"OpenFOAM is gone: {error.strerror}") from None
-
-    def _read(self, size: int) -> bytes:
-        deadline = time.monotonic() + self.timeout
-        data = bytearray()
-        while len(data) < size:
             self._wait(select.POLLIN, deadline)
             try:
-                part = self._socket.recv(min(size - len(data), 1 << 20))
+                got = self._socket.recv_into(view)
             except BlockingIOError:
                 continue
             except OSError as error:
                 raise self.error(f"OpenFOAM is gone: {error.strerror}") from None
-            if not part:
+            if not got:
                 raise self.error("OpenFOAM closed the connection before its end")
-            data += part
-        return bytes(data)
+            view = view[got:]
+        return data
 
     def close(self) -> None:
         with contextlib.suppress(OSError):
@@ -117,12 +119,12 @@ class SocketListener(Listener):
 class UnixListener(SocketListener):
     """`gbm.sock` in the case, mode 0600."""
 
-    def __init__(self, case: Path, coupling: Coupling, log: Path):
+    def __init__(self, case: Path, coupling: Coupling, log: Path, share: Share):
         super().__init__(case, coupling, log)
         # through the folder's descriptor: a socket's path holds 107 characters, and a case may lie deeper
         self._folder = os.open(case, os.O_PATH | os.O_DIRECTORY)
-        address = f"/proc/self/fd/{self._folder}/gbm.sock"
-        self.path = case / "gbm.sock"
+        self.path = case / share.name("gbm", ".sock")
+        address = f"/proc/self/fd/{self._folder}/{self.path.name}"
         self.server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._remove_stale(address)
@@ -156,10 +158,10 @@ class UnixListener(SocketListener):
 class TcpListener(SocketListener):
     """A port, by default on the loopback address, named with a secret in `gbm.tcp`, mode 0600."""
 
-    def __init__(self, case: Path, coupling: Coupling, log: Path):
+    def __init__(self, case: Path, coupling: Coupling, log: Path, share: Share):
         super().__init__(case, coupling, log)
         self.token = secrets.token_hex(16)
-        self.path = case / "gbm.tcp"
+        self.path = case / share.name("gbm", ".tcp")
         try:
             self.server = socket.create_server((coupling.host, coupling.port), backlog=4)
         except OSError as error:

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..case.scene import Family
+from ..case.share import WHOLE, Share
 from ..output.restarts import keep_earlier
 
 
 class StepTable:
     """`daemon.dat`: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s], <R^2>/L^2."""
 
-    def __init__(self, folder: Path, families: Sequence[Family]):
-        self._path = keep_earlier(folder / "daemon.dat")
+    def __init__(self, folder: Path, families: Sequence[Family], share: Share = WHOLE):
+        self._path = keep_earlier(folder / share.name("daemon", ".dat"))
         self._file = self._path.open("w", buffering=1)
         names = ["Time", "step", "sentAt", "arrivedAt", "gap", *(f"R2_{f.name}" for f in families)]
         self._file.write("# " + "\t".join(names) + "\n")

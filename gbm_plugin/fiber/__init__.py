@@ -3,6 +3,6 @@
 from .fibers import Fibers
 from .rates import instant_rates
 from .simulate import Trajectory, simulate
-from .stepper import Stepper
+from .stepper import Stepper, merged_states
 
-__all__ = ["Fibers", "Stepper", "Trajectory", "instant_rates", "simulate"]
+__all__ = ["Fibers", "Stepper", "Trajectory", "instant_rates", "merged_states", "simulate"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from .layout import COPYING, pack, threads_for
+from .layout import COPYING, pack, threads_for, unpack
 from .simd import LANES
 
 SAMPLES = 3  # in the polynomial in time
@@ -83,10 +83,13 @@ class Ambient:
         return np.sqrt(square.reshape(-1)[: self.shape[0]] / self.shape[1])
 
     def state(self) -> dict[str, np.ndarray]:
-        """Times and samples, in blocks."""
-        return {"sample_times": np.array(self.times), "samples": np.array(self.samples)}
+        """Times (S,) and samples (F, S, 2, 3N) of velocity and rotation."""
+        fibers = self.shape[0]
+        samples = [[unpack(field, (fibers, -1)) for field in sample] for sample in self.samples]
+        return {"sample_times": np.array(self.times), "samples": np.moveaxis(np.array(samples), 2, 0)}
 
     def restore(self, state) -> None:
         """Take back what state() gave."""
         self.times = [float(time) for time in state["sample_times"]]
-        self.samples = [(np.array(velocity), np.array(rotation)) for velocity, rotation in state["samples"]]
+        samples = np.moveaxis(state["samples"], 0, 2)
+        self.samples = [(pack(velocity), pack(rotation)) for velocity, rotation in samples]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from .bending import CURVATURE_LAWS, TORQUES, bending_energy
@@ -111,6 +113,13 @@ class Fibers:
         offsets = diameter * (np.arange(beads) - (beads - 1) / 2)
         positions = centres[:, None] + offsets[:, None] * directions[:, None]
         return cls(positions, bending_stiffness, viscosity, **options)
+
+    def part(self, which: slice) -> Fibers:
+        """Some of these fibers, the same to the last bit."""
+        part = copy(self)
+        part.centres, part.links = self.centres[which], self.links[which]
+        part.bending_stiffness = self.bending_stiffness[which]
+        return part
 
     @property
     def count(self) -> int:

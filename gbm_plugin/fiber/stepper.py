@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import get_num_threads
 
@@ -10,7 +12,7 @@ from .ambient import SAMPLES, Ambient, lagrange_weights
 from .bending import CURVATURE_LAWS, velocity_scale
 from .contact import repulsion_velocity
 from .fibers import Fibers, one_of, positive
-from .layout import COPYING, bead_positions, pack, threads_for
+from .layout import COPYING, bead_positions, pack, threads_for, unpack
 from .mobility import MOBILITIES
 from .simd import LANES
 from .strain import with_strain
@@ -223,7 +225,7 @@ class Stepper:
         )  # fmt: skip
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
-        self._tension = tension.max()
+        self._tension = tension.reshape(-1)[: fibers.count].max()
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
         self._count(count, error if self.integrator == "ab3" else error[error <= self.local_tolerance])
@@ -276,12 +278,13 @@ class Stepper:
         return dict(self._counts)
 
     def state(self) -> dict[str, np.ndarray]:
-        """Everything that a bitwise restart needs."""
+        """Everything that a bitwise restart needs; arrays of fibers have these in their first dimension."""
+        count = self.fibers.count
         own = {
             "time": np.array(self.time),
-            "links_and_centres": self._state.copy(),
-            "multipliers": self._multipliers.copy(),
-            "rates": np.stack(self._rates),
+            "links_and_centres": unpack(self._state, (count, -1)),
+            "multipliers": unpack(self._multipliers, (count, -1)),
+            "rates": np.stack([unpack(rates, (count, -1)) for rates in self._rates], axis=1),
             "rate_ages": np.array(self._ages),
             "suggested_step": self._step.copy(),
             "tension": np.array(self._tension),
@@ -290,16 +293,39 @@ class Stepper:
 
     def restore(self, state) -> None:
         """Take back what state() gave; ValueError if it is of other fibers."""
-        shape = np.shape(state["links_and_centres"])
-        if shape != self._state.shape:
-            raise ValueError(f"state holds blocks of shape {shape}; these fibers need {self._state.shape}")
+        shape = (self.fibers.count, 3 * self.fibers.beads)
+        if np.shape(state["links_and_centres"]) != shape:
+            raise ValueError(
+                f"state holds links of shape {np.shape(state['links_and_centres'])}; these fibers need {shape}"
+            )
         self.time = float(state["time"])
-        self._state[...] = state["links_and_centres"]
-        self._multipliers[...] = state["multipliers"]
-        self._rates = [np.array(rates) for rates in state["rates"]]
+        pack(state["links_and_centres"], self._state)
+        pack(state["multipliers"], self._multipliers)
+        self._rates = [pack(rates) for rates in np.moveaxis(state["rates"], 1, 0)]
         self._last_rates = list(self._rates)
         self._ages = [float(age) for age in state["rate_ages"]]
         self._step = np.array(state["suggested_step"])
         self._tension = float(state["tension"])
         self.provisional = False
         self._ambient.restore(state)
+
+
+def merged_states(states: Sequence[dict], part: slice) -> dict[str, np.ndarray]:
+    """The state of some fibers out of the states of groups that follow each other in one family.
+
+    Groups whose explicit steps had different lengths lose the history of their rates: the next step begins
+    that anew. ValueError where they are of different times.
+    """
+    merged = {
+        key: np.concatenate([state[key] for state in states])[part]
+        for key in ("links_and_centres", "multipliers", "rates", "suggested_step", "samples")
+    }
+    first = states[0]
+    for key in ("time", "sample_times"):
+        if not all(np.array_equal(first[key], state[key]) for state in states):
+            raise ValueError(f"the parts of a family differ in {key.replace('_', ' ')}")
+        merged[key] = first[key]
+    same = all(np.array_equal(first["rate_ages"], state["rate_ages"]) for state in states)
+    merged["rate_ages"] = first["rate_ages"] if same else np.zeros(0)
+    merged["tension"] = np.max([state["tension"] for state in states])
+    return merged

@@ -40,7 +40,7 @@ class Progress:
         if self._bar.disable:
             return
         flow = newest_row(self._case, "linearForcing/*/linearForcing.dat")
-        fibers = newest_row(self._case, "fibers/*/daemon.dat")
+        fibers = newest_row(self._case, "fibers/*/daemon*.dat")
         time = fibers.get("Time", flow.get("Time", self._start))
         parts = []
         if flow:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.share import shared_files
+from ..case.times import as_time
 from .recorder import SCHEMA_VERSION, FamilyRecord, Recorder
-from .restarts import files_by_start, kept
+from .restarts import kept
 from .transaction import Transaction
 
 __all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open_recording"]
@@ -74,20 +76,17 @@ class Recording:
         self._parts = parts
         last = parts[-1]
         counts = kept([part.times for part in parts])
-        self.paths = [part.path for part in parts]
+        self.paths = [path for part in parts for path in part.paths]
         self.times = np.concatenate([part.times[:count] for part, count in zip(parts, counts, strict=True)])
         self.steps = np.concatenate([part.steps[:count] for part, count in zip(parts, counts, strict=True)])
-        self.box_origin = last.file["box_origin"][()]
-        self.box_size = last.file["box_size"][()]
-        self.metadata = last.metadata()
+        self.box_origin = last.files[0].file["box_origin"][()]
+        self.box_size = last.files[0].file["box_size"][()]
+        self.metadata = last.files[0].metadata()
         self.families = {
             name: Family(
                 **vars(record),
                 positions=Positions(
-                    [
-                        (part.file[f"families/{name}/positions"], count)
-                        for part, count in zip(parts, counts, strict=True)
-                    ]
+                    [(part.positions(name), count) for part, count in zip(parts, counts, strict=True)]
                 ),
             )
             for name, record in last.families.items()
@@ -105,6 +104,64 @@ class Recording:
 
 
 class _Part:
+    """What one run wrote from its start on: a file, or one of each daemon that shared the fibers."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        self.paths = paths
+        self.files: list[_File] = []
+        try:
+            for path in paths:
+                self.files.append(_File(path))
+        except BaseException:
+            self.close()
+            raise
+        first = self.files[0]
+        complete = min(len(file.times) for file in self.files)  # a kill leaves some with one record more
+        self.times, self.steps = first.times[:complete], first.steps[:complete]
+        self.families = first.families
+        for file in self.files[1:]:
+            if not np.array_equal(file.steps[:complete], self.steps) or list(file.families) != list(
+                self.families
+            ):
+                self.close()
+                raise ValueError(
+                    f"{file.path} and {first.path} are not of one run: their steps or families differ"
+                )
+        if len(self.files) > 1:
+            self.families = {name: self._joined(name) for name in self.families}
+
+    def _joined(self, name: str) -> FamilyRecord:
+        records = [file.families[name] for file in self.files]
+        stiffness = records[0].bending_stiffness
+        if np.ndim(stiffness):
+            stiffness = np.concatenate([record.bending_stiffness for record in records])
+        return replace(records[0], count=sum(record.count for record in records), bending_stiffness=stiffness)
+
+    def positions(self, name: str) -> h5py.Dataset | _Joined:
+        datasets = [file.file[f"families/{name}/positions"] for file in self.files]
+        return datasets[0] if len(datasets) == 1 else _Joined(datasets)
+
+    def close(self) -> None:
+        for file in self.files:
+            file.close()
+
+
+class _Joined:
+    """Datasets (S, F, N, 3) of several files as one, their fibers one after the other."""
+
+    def __init__(self, datasets: list[h5py.Dataset]) -> None:
+        self._datasets = datasets
+        shapes = [dataset.shape for dataset in datasets]
+        self.shape = (min(s[0] for s in shapes), sum(s[1] for s in shapes), *shapes[0][2:])
+
+    def __getitem__(self, key: tuple) -> NDArray[np.float64]:
+        times, *rest = key
+        whole = isinstance(times, slice)
+        values = np.concatenate([dataset[times] for dataset in self._datasets], axis=1 if whole else 0)
+        return values[(slice(None), *rest) if whole else tuple(rest)]
+
+
+class _File:
     """One open file."""
 
     def __init__(self, path: Path) -> None:
@@ -161,6 +218,12 @@ class _Part:
         self._changes.close()
 
 
+def _by_start(folder: Path) -> list[list[Path]]:
+    """The files of each start time in a folder postProcessing/fibers, in their order."""
+    starts = sorted((start, path) for path in folder.iterdir() if (start := as_time(path.name)) is not None)
+    return [files for _, path in starts if (files := shared_files(path, "fibers", ".h5"))]
+
+
 def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
     """Open a recording: one file, a folder ``postProcessing/fibers`` of a case, or a list of files.
 
@@ -171,19 +234,19 @@ def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
     paths = [paths] if isinstance(paths, (str, Path)) else list(paths)
     files = []
     for path in map(Path, paths):
-        files += files_by_start(path, "fibers.h5") if path.is_dir() else [path]
+        files += _by_start(path) if path.is_dir() else [[path]]
     if not files:
         raise FileNotFoundError(f"no fiber recording ({', '.join(map(str, paths)) or 'an empty list'})")
     parts: list[_Part] = []
     try:
-        for file in files:
-            parts.append(_Part(file))
+        for shared in files:
+            parts.append(_Part(shared))
         first = parts[0]
         for part in parts[1:]:
             shapes = [{name: family.shape for name, family in p.families.items()} for p in (first, part)]
             if shapes[0] != shapes[1]:
                 raise ValueError(
-                    f"{part.path} holds families {shapes[1]}, {first.path} {shapes[0]}: not one run"
+                    f"{part.paths[0]} holds families {shapes[1]}, {first.paths[0]} {shapes[0]}: not one run"
                 )
     except BaseException:
         for part in parts:

@@ -16,6 +16,7 @@ import numpy as np
 
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.case.scene import read_scene
+from gbm_plugin.case.share import Share
 from gbm_plugin.coupling.channel import listen
 from gbm_plugin.coupling.message import Hello, Kind, Message, encode_array, encode_header, encode_welcome
 
@@ -87,6 +88,7 @@ class FakeSolver:
             "box_min": (0.0, 0.0, 0.0),
             "box_max": (BOX, BOX, BOX),
             "cells": 4096,
+            "share": Share(),
             "folder": "0",
             "token": token,
         }
@@ -174,7 +176,7 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
 
 def greet(channel, first: Message, beads: int) -> None:
     """WELCOME, and step 0 as it should be."""
-    channel.send(Message(Kind.WELCOME, first.step, first.time, encode_welcome("rotation", [(beads, 1)])))
+    channel.send(Message(Kind.WELCOME, first.step, first.time, encode_welcome("rotation", [(beads, 1, 0)])))
     channel.send(positions(0, beads))
     channel.receive(1 << 20)
 
@@ -253,6 +255,6 @@ def alive(pid: int) -> bool:
 
 def last_step(case: Path) -> int:
     """The latest step in the daemon's newest table; -1 without one."""
-    tables = sorted(case.glob("postProcessing/fibers/*/daemon.dat"), key=lambda p: p.stat().st_mtime)
+    tables = sorted(case.glob("postProcessing/fibers/*/daemon*.dat"), key=lambda p: p.stat().st_mtime)
     rows = re.findall(r"^[\d.e+-]+\t(\d+)\t.*\n", tables[-1].read_text(), re.M) if tables else []
     return int(rows[-1]) if rows else -1

@@ -33,7 +33,7 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
             first = channel.receive()
             hello = Hello.decode(first.payload)
             channel.send(
-                Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1)]))
+                Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1, 0)]))
             )
             step = first.step
             while True:

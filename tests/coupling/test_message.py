@@ -11,6 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from gbm_plugin.case.share import WHOLE, Share
 from gbm_plugin.coupling.message import (
     HEADER_SIZE,
     MAX_TEXT,
@@ -39,8 +40,9 @@ messages = st.builds(
     st.binary(max_size=200),
     st.integers(0, 2**32 - 1),
 )
+shares = st.integers(1, 2**40).flatmap(lambda of: st.builds(Share, st.integers(1, of), st.just(of)))
 hellos = st.builds(
-    Hello, finite, finite, triple, triple, st.integers(0, 2**50),
+    Hello, finite, finite, triple, triple, st.integers(0, 2**50), shares,
     st.from_regex(r"(processor[0-9]{1,4}/)?[0-9]{1,6}(\.[0-9]{1,6})?", fullmatch=True), st.text(max_size=40),
 )  # fmt: skip
 
@@ -73,7 +75,7 @@ def test_sample_round_trip(need, beads, rng):
     extra = {"velocity": 0, "rotation": 3, "gradient": 9}[need]
     u = np.array([rng.uniform(-9, 9) for _ in range(3 * beads)]).reshape(beads, 3)
     rest = np.array([rng.uniform(-9, 9) for _ in range(extra * beads)])
-    message = Message(Kind.SAMPLE, 7, 0.1, encode_array(u) + encode_array(rest))
+    message = Message(Kind.SAMPLE, 7, 0.1, bytes(encode_array(u)) + bytes(encode_array(rest)))
     assert len(message.payload) == sample_size(beads, need)
     velocity, found = decode_sample(message, beads, need)
     np.testing.assert_array_equal(velocity, u)
@@ -84,7 +86,16 @@ def test_sample_round_trip(need, beads, rng):
 
 
 def test_welcome_is_a_list_of_integers():
-    assert struct.unpack("<6q", encode_welcome("gradient", [(60, 20), (1, 2)])) == (2, 2, 60, 20, 1, 2)
+    assert struct.unpack("<8q", encode_welcome("gradient", [(60, 20, 5), (1, 2, 0)])) == (
+        2,
+        2,
+        60,
+        20,
+        5,
+        1,
+        2,
+        0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -93,14 +104,14 @@ def test_welcome_is_a_list_of_integers():
         (b"", "short message: 0 bytes"),
         (b"GBMC" + bytes(35), "short message: 39 bytes"),
         (b"HTTP" + bytes(36), "not a message of a gbm plugin"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", 2, 1, 0, 0, 0, 0.0, 0), "version 2"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", 1, 0, 0, 0, 0, 0.0, 0), "unknown kind 0"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", 1, 9, 0, 0, 0, 0.0, 0), "unknown kind 9"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION + 1, 1, 0, 0, 0, 0.0, 0), f"version {VERSION + 1}"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 0, 0, 0, 0, 0.0, 0), "unknown kind 0"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 9, 0, 0, 0, 0.0, 0), "unknown kind 9"),
         (
-            b"GBMC" + struct.pack("<HHIIqdQ", 1, 4, 0, 0, 0, 0.0, MAX_TEXT + 1),
+            b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 0, 0, 0.0, MAX_TEXT + 1),
             f"announces {MAX_TEXT + 1} bytes",
         ),
-        (b"GBMC" + struct.pack("<HHIIqdQ", 1, 4, 0, 0, 5, float("inf"), 0), "step 5 has the time inf"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 0, 5, float("inf"), 0), "step 5 has the time inf"),
     ],
 )
 def test_header_that_is_none(data, expected):
@@ -164,7 +175,7 @@ def decode_all(data: bytes) -> int:
 
 @settings(max_examples=2000, deadline=None)
 @given(st.binary(max_size=200))
-@example(Hello(1.0, 1.0, (0.0,) * 3, (1.0,) * 3, 8, "0", "").encode())
+@example(Hello(1.0, 1.0, (0.0,) * 3, (1.0,) * 3, 8, WHOLE, "0", "").encode())
 def test_whatever_arrives(data):
     decode_all(data)
 
@@ -172,7 +183,7 @@ def test_whatever_arrives(data):
 def test_a_hundred_thousand_damaged_messages():
     """Valid bytes with a few of them changed, cut, doubled or inserted, which get much deeper than random ones."""
     rng = random.Random(1)
-    hello = Hello(0.01, 0.02, (0.0,) * 3, (6.28,) * 3, 4096, "processor0/0.2", "f" * 32).encode()
+    hello = Hello(0.01, 0.02, (0.0,) * 3, (6.28,) * 3, 4096, Share(2, 3), "processor0/0.2", "f" * 32).encode()
     seeds = [
         Message(Kind.HELLO, 3, 0.1, hello).encode(),
         hello,

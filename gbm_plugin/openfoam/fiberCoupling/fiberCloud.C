@@ -5,8 +5,8 @@
 void Foam::writeFiberCloud
 (
     const fvMesh& mesh,
-    const sampler& beads,
-    const UList<fiberFamily>& families
+    const beadExchange& beads,
+    const List<List<fiberFamily>>& families
 )
 {
     const word name("fibers");
@@ -26,7 +26,7 @@ void Foam::writeFiberCloud
                 IOobject::NO_WRITE,
                 false
             ),
-            beads.indices().size()
+            beads.points().size()
         );
     };
 
@@ -34,23 +34,23 @@ void Foam::writeFiberCloud
     IOField<label> fiber(labels("fiber"));
     IOField<label> bead(labels("bead"));
 
-    forAll(beads.indices(), i)
+    forAll(beads.points(), i)
     {
         cloud.addParticle
         (
             new passiveParticle(mesh, beads.points()[i], beads.cells()[i])
         );
 
-        label rest = beads.indices()[i];
-        label f = 0;
-        while (rest >= families[f].count*families[f].beads)
+        label rest = beads.numberOf(i);
+        const fiberFamily* part = families[beads.rankOf(i)].cdata();
+        while (rest >= part->size())
         {
-            rest -= families[f].count*families[f].beads;
-            ++f;
+            rest -= part->size();
+            ++part;
         }
-        family[i] = f;
-        fiber[i] = rest / families[f].beads;
-        bead[i] = rest % families[f].beads;
+        family[i] = part->family;
+        fiber[i] = part->first + rest / part->beads;
+        bead[i] = rest % part->beads;
     }
 
     cloud.write();

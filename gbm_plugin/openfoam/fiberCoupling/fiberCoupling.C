@@ -4,7 +4,6 @@
 #include "keepEarlier.H"
 #include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
-#include "fvc.H"
 
 namespace Foam
 {
@@ -74,8 +73,7 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
     writeFile(mesh_, name, "coupling"),
     deltaT_(time.deltaTValue()),
     step_(time.timeIndex()),
-    beads_(0),
-    ambient_(NOTHING)
+    wanted_(NOTHING)
 {
     const fatalErrors guard;
 
@@ -103,6 +101,7 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
 
     box_.reset(new periodicBox(mesh_));
     sampler_ = sampler::New(fiberProperties, mesh_, box_());
+    beads_.reset(new beadExchange(box_(), sampler_->places()));
 
     if (Pstream::master())
     {
@@ -114,7 +113,7 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
         (
             const char* column :
             {
-                "wait", "derivative", "interpolation", "sending",
+                "wait", "location", "sampling", "sending",
                 "arrivedAt", "sentAt"
             }
         )
@@ -148,83 +147,100 @@ void Foam::functionObjects::fiberCoupling::shakeHands
 )
 {
     const double cells = returnReduce(double(mesh_.nCells()), sumOp<double>());
+    const dictionary coupling(fiberProperties.subOrEmptyDict("coupling"));
+    const label count = coupling.lookupOrDefault<label>("daemons", 1);
+
+    if (count < 1)
+    {
+        FatalIOErrorInFunction(coupling)
+            << "daemons = " << count << " must be at least 1"
+            << exit(FatalIOError);
+    }
+
+    message hello(message::HELLO, step_, time_.value());
+    hello.append<double>(kinematicViscosity(mesh_));
+    hello.append<double>(deltaT_);
+    hello.append(box_->min().cdata(), 3);
+    hello.append(box_->max().cdata(), 3);
+    hello.append(cells);
+
+    for (label daemon = 0; daemon < count; ++daemon)
+    {
+        if ((daemon*Pstream::nProcs())/count == Pstream::myProcNo())
+        {
+            const std::string folder(timeFolder());
+            message own(hello);
+            own.append<std::int64_t>(daemon + 1);
+            own.append<std::int64_t>(count);
+            own.append<std::int64_t>(folder.size());
+            own.appendText(folder);
+
+            daemons_.append
+            (
+                new fiberDaemon
+                (
+                    coupling, time_.globalPath(), {daemon + 1, count}, own
+                )
+            );
+        }
+    }
+    learnFamilies();
 
     if (Pstream::master())
     {
-        daemon_ = connection::New
-        (
-            fiberProperties.subOrEmptyDict("coupling"),
-            time_.globalPath()
-        );
-
-        message hello(message::HELLO, step_, time_.value());
-        hello.append<double>(kinematicViscosity(mesh_));
-        hello.append<double>(deltaT_);
-        hello.append(box_->min().cdata(), 3);
-        hello.append(box_->max().cdata(), 3);
-        hello.append(cells);
-        const std::string folder(timeFolder());
-        hello.append<std::int64_t>(folder.size());
-        hello.appendText(folder);
-        hello.appendText(daemon_->token());
-        daemon_->send(hello);
-
-        readWelcome
-        (
-            daemon_->receive(message::WELCOME, step_, 32, message::maxText)
-        );
-
-        Info<< type() << ": " << families_.size() << " families with "
-            << beads_ << " beads, daemon on " << daemon_->peer().c_str()
-            << endl;
-    }
-
-    Pstream::scatter(beads_);
-    label wanted = ambient_;
-    Pstream::scatter(wanted);
-    ambient_ = wanted;
-
-    labelList sizes(2*families_.size());
-    forAll(families_, i)
-    {
-        sizes[2*i] = families_[i].count;
-        sizes[2*i + 1] = families_[i].beads;
-    }
-    Pstream::scatter(sizes);
-    families_.setSize(sizes.size()/2);
-    forAll(families_, i)
-    {
-        families_[i] = {sizes[2*i], sizes[2*i + 1]};
+        label beads = 0;
+        for (const List<fiberFamily>& families : families_)
+        {
+            for (const fiberFamily& f : families)
+            {
+                beads += f.size();
+            }
+        }
+        Info<< type() << ": " << beads << " beads, " << count
+            << (count > 1 ? " daemons, the first on " : " daemon, on ")
+            << daemons_[0].peer().c_str() << endl;
     }
 }
 
 
-void Foam::functionObjects::fiberCoupling::readWelcome(const message& m)
+void Foam::functionObjects::fiberCoupling::learnFamilies()
 {
-    // what to sample, how many families, then fibers and beads of each
-    const std::vector<std::int64_t> n(m.values<std::int64_t>());
+    List<labelList> all(Pstream::nProcs());
+    labelList& mine = all[Pstream::myProcNo()];
 
-    bool valid = n[0] >= NOTHING && n[0] <= GRADIENT
-     && m.payload.size() == sizeof(std::int64_t)*n.size()
-     && n.size() % 2 == 0 && n[1] == std::int64_t(n.size()/2 - 1);
-
-    std::int64_t beads = 0;
-    for (std::size_t i = 2; valid && i < n.size(); i += 2)
+    for (const fiberDaemon& daemon : daemons_)
     {
-        valid = n[i] > 0 && n[i + 1] > 0 && n[i] <= labelMax/n[i + 1];
-        if (valid)
+        for (const fiberFamily& f : daemon.families())
         {
-            beads += n[i]*n[i + 1];
-            families_.append({label(n[i]), label(n[i + 1])});
+            mine.append(labelList({f.family, f.count, f.beads, f.first}));
         }
     }
-    if (!valid || beads > labelMax)
+    Pstream::gatherList(all);
+    Pstream::scatterList(all);
+
+    families_.setSize(all.size());
+    forAll(all, rank)
     {
-        daemon_->fail("WELCOME holds numbers that are not allowed");
+        const labelList& n = all[rank];
+        for (label i = 0; i < n.size(); i += 4)
+        {
+            families_[rank].append({n[i], n[i + 1], n[i + 2], n[i + 3]});
+        }
     }
 
-    ambient_ = n[0];
-    beads_ = beads;
+    // the same in all shares of the fibers
+    label wanted = daemons_.size() ? label(daemons_[0].wanted()) : NOTHING;
+    reduce(wanted, maxOp<label>());
+    wanted_ = ambient(wanted);
+    for (const fiberDaemon& daemon : daemons_)
+    {
+        if (daemon.wanted() != wanted_)
+        {
+            FatalErrorInFunction
+                << "the daemons want different fields: they are not of one"
+                << " version of one case" << exit(FatalError);
+        }
+    }
 }
 
 
@@ -234,111 +250,54 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
     times& t
 )
 {
-    bool provisional = false;
-    bool stop = false;
     stopwatch watch;
 
-    if (Pstream::master())
+    label beads = 0;
+    for (const fiberDaemon& daemon : daemons_)
     {
-        const std::uint64_t size = std::uint64_t(beads_)*sizeof(point);
-        const message m(daemon_->receive(message::POSITIONS, step_, size));
-        provisional = m.head.flags & message::provisional;
-        stop = m.head.flags & message::stop;
-
-        // isfinite first: comparing with NaN would raise SIGFPE
-        if
-        (
-            !std::isfinite(m.head.time)
-         || mag(m.head.time - time_.value()) > 1e-6*deltaT_
-        )
-        {
-            daemon_->fail
-            (
-                "POSITIONS are of time " + Foam::name(m.head.time)
-              + ", expected time " + Foam::name(time_.value())
-            );
-        }
-
-        positions.setSize(beads_);
-        std::memcpy(positions.begin(), m.payload.data(), size);
-        forAll(positions, i)
-        {
-            const point& p = positions[i];
-            if
-            (
-                !std::isfinite(p.x())
-             || !std::isfinite(p.y())
-             || !std::isfinite(p.z())
-            )
-            {
-                daemon_->fail
-                (
-                    "POSITIONS are not finite at bead " + std::to_string(i)
-                );
-            }
-        }
+        beads += daemon.beads();
     }
+    positions.setSize(beads);
 
-    Pstream::scatter(provisional);
-    Pstream::scatter(stop);
-    Pstream::scatter(positions);
-
-    if (stop)
+    // how many there are, will correct these positions, and ask for the end
+    Vector<label> daemons(Zero);
+    label start = 0;
+    for (fiberDaemon& daemon : daemons_)
     {
-        Info<< type() << ": the daemon was asked to end the run:"
+        const std::uint32_t flags = daemon.receivePositions
+        (
+            step_,
+            time_.value(),
+            1e-6*deltaT_,
+            SubList<point>(positions, daemon.beads(), start)
+        );
+        daemons += Vector<label>
+        (
+            1,
+            (flags & message::provisional) ? 1 : 0,
+            (flags & message::stop) ? 1 : 0
+        );
+        start += daemon.beads();
+    }
+    reduce(daemons, sumOp<Vector<label>>());
+
+    if (daemons.y() && daemons.y() != daemons.x())
+    {
+        FatalErrorInFunction
+            << "at step " << step_ << " some daemons will correct their"
+            << " positions and others not: they did not start from the same"
+            << " time" << exit(FatalError);
+    }
+    if (daemons.z())
+    {
+        Info<< type() << ": a daemon was asked to end the run:"
             << " writing and stopping after the next step" << endl;
         time_.stopAt(Time::stopAtControls::saWriteNow);
     }
 
     t.wait += watch.lap();
 
-    return provisional;
-}
-
-
-template<class Type>
-void Foam::functionObjects::fiberCoupling::collect
-(
-    const Field<Type>& mine,
-    message& m
-) const
-{
-    List<labelList> indices(Pstream::nProcs());
-    List<Field<Type>> values(Pstream::nProcs());
-    indices[Pstream::myProcNo()] = sampler_->indices();
-    values[Pstream::myProcNo()] = mine;
-    Pstream::gatherList(indices);
-    Pstream::gatherList(values);
-
-    if (!Pstream::master())
-    {
-        return;
-    }
-
-    Field<Type> all(beads_);
-    label found = 0;
-    forAll(indices, rank)
-    {
-        UIndirectList<Type>(all, indices[rank]) = values[rank];
-        found += indices[rank].size();
-    }
-    if (found != beads_)
-    {
-        FatalErrorInFunction
-            << found << " of " << beads_ << " beads were found in the mesh"
-            << exit(FatalError);
-    }
-    forAll(all, i)
-    {
-        if (!std::isfinite(magSqr(all[i])))
-        {
-            FatalErrorInFunction
-                << "the flow at bead " << i << " is not finite at step "
-                << step_ << ", time " << time_.value() << exit(FatalError);
-        }
-    }
-
-    m.append(all.cdata(), all.size());
+    return daemons.y();
 }
 
 
@@ -349,44 +308,32 @@ void Foam::functionObjects::fiberCoupling::sendSample
 )
 {
     const volVectorField& U = mesh_.lookupObject<volVectorField>(UName_);
+    const label n = 3 + components(wanted_);
     stopwatch watch;
 
-    tmp<volVectorField> rotation;
-    tmp<volTensorField> gradient;
-    if (ambient_ == ROTATION)
-    {
-        rotation = 0.5*fvc::curl(U);
-    }
-    else if (ambient_ == GRADIENT)
-    {
-        // OpenFOAM's gradient is the transpose of du_i/dx_j
-        gradient = fvc::grad(U)().T();
-    }
-    t.derivative += watch.lap();
+    const scalarList sampled
+    (
+        sampler_->sample(U, wanted_, beads_->points(), beads_->cells())
+    );
+    t.sampling += watch.lap();
 
-    message sample(message::SAMPLE, step_, time_.value());
+    const scalarList values(beads_->collect(sampled, n));
 
-    collect(sampler_->sample(U), sample);
-    if (rotation.valid())
-    {
-        collect(sampler_->sample(rotation()), sample);
-    }
-    if (gradient.valid())
-    {
-        collect(sampler_->sample(gradient()), sample);
-    }
-    t.interpolation += watch.lap();
-
-    if (Pstream::master())
+    label start = 0;
+    for (fiberDaemon& daemon : daemons_)
     {
         // with the case's own fields of this time, which are on disk already
         if (time_.writeTime() && !provisional)
         {
-            message save(message::SAVE, step_, time_.value());
-            save.appendText(timeFolder());
-            daemon_->send(save);
+            daemon.save(step_, time_.value(), timeFolder());
         }
-        daemon_->send(sample);
+        daemon.sendSample
+        (
+            step_,
+            time_.value(),
+            SubList<scalar>(values, n*daemon.beads(), start)
+        );
+        start += n*daemon.beads();
     }
     t.sending += watch.lap();
 }
@@ -405,13 +352,13 @@ void Foam::functionObjects::fiberCoupling::exchange()
         arrived = timeOfDay();
 
         stopwatch watch;
-        sampler_->locate(positions);
-        t.interpolation += watch.lap();
+        beads_->locate(positions);
+        t.location += watch.lap();
 
-        // before the daemon writes its state, which completes a time folder
+        // before the daemons write their state, which completes a time folder
         if (writeCloud_ && time_.writeTime() && !provisional)
         {
-            writeFiberCloud(mesh_, sampler_(), families_);
+            writeFiberCloud(mesh_, beads_(), families_);
         }
 
         sendSample(provisional, t);
@@ -428,12 +375,17 @@ void Foam::functionObjects::fiberCoupling::writeTimes
     scalar left
 )
 {
+    scalarList spent({t.wait, t.location, t.sampling, t.sending});
+    Pstream::listCombineGather(spent, maxEqOp<scalar>());
+
     if (Pstream::master())
     {
         writeCurrentTime(file());
+        for (const scalar seconds : spent)
+        {
+            file() << token::TAB << seconds;
+        }
         file()
-            << token::TAB << t.wait << token::TAB << t.derivative
-            << token::TAB << t.interpolation << token::TAB << t.sending
             << setprecision(17)
             << token::TAB << arrived << token::TAB << left
             << setprecision(writePrecision_) << endl;
@@ -511,20 +463,11 @@ bool Foam::functionObjects::fiberCoupling::end()
 {
     const fatalErrors guard;
 
-    if (daemon_.valid())
+    for (fiberDaemon& daemon : daemons_)
     {
-        daemon_->send(message(message::END, step_, time_.value()));
-
-        // the daemon is one step ahead: its last positions are not needed
-        daemon_->receive
-        (
-            message::POSITIONS,
-            step_ + 1,
-            std::uint64_t(beads_)*sizeof(point)
-        );
-        daemon_->receive(message::GOODBYE, step_, 0);
-        daemon_.clear();
+        daemon.end(step_, time_.value());
     }
+    daemons_.clear();
 
     return true;
 }

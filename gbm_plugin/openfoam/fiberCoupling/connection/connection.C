@@ -4,13 +4,33 @@
 #include "fileConnection.H"
 #include "OSspecific.H"
 
+std::string Foam::daemonShare::name
+(
+    const std::string& stem,
+    const std::string& suffix
+) const
+{
+    if (of == 1)
+    {
+        return stem + suffix;
+    }
+    return
+        stem + "." + std::to_string(number) + "of" + std::to_string(of)
+      + suffix;
+}
+
+
 Foam::autoPtr<Foam::connection> Foam::connection::New
 (
     const dictionary& coupling,
-    const fileName& caseFolder
+    const fileName& caseFolder,
+    const daemonShare& share
 )
 {
-    allowedEntries(coupling, {"transport", "timeout", "host", "port"});
+    allowedEntries
+    (
+        coupling, {"transport", "timeout", "host", "port", "daemons"}
+    );
 
     const word transport =
         coupling.lookupOrDefault<word>("transport", "socket");
@@ -19,12 +39,17 @@ Foam::autoPtr<Foam::connection> Foam::connection::New
     {
         return autoPtr<connection>
         (
-            new socketConnection(coupling, caseFolder, transport == "tcp")
+            new socketConnection
+            (
+                coupling, caseFolder, share, transport == "tcp"
+            )
         );
     }
     if (transport == "file")
     {
-        return autoPtr<connection>(new fileConnection(coupling, caseFolder));
+        return autoPtr<connection>(
+            new fileConnection(coupling, caseFolder, share)
+        );
     }
 
     FatalIOErrorInFunction(coupling)
@@ -38,10 +63,12 @@ Foam::autoPtr<Foam::connection> Foam::connection::New
 Foam::connection::connection
 (
     const dictionary& coupling,
-    const fileName& caseFolder
+    const fileName& caseFolder,
+    const daemonShare& share
 )
 :
     case_(caseFolder),
+    share_(share),
     timeout_(coupling.lookupOrDefault<scalar>("timeout", 120)),
     step_(-1)
 {
@@ -51,6 +78,14 @@ Foam::connection::connection
             << "timeout = " << timeout_ << " must be positive [s]"
             << exit(FatalIOError);
     }
+}
+
+
+Foam::string Foam::connection::startCommand() const
+{
+    return
+        "gbm daemon " + case_
+      + (share_.of > 1 ? " --share " + std::to_string(share_.number) : "");
 }
 
 
@@ -65,7 +100,7 @@ void Foam::connection::fail(const string& what) const
     FatalErrorInFunction
         << "fiber coupling, step " << label(step_) << ": "
         << what.c_str() << " (daemon on " << peer_.c_str() << ", its log: "
-        << (case_/"log.gbmDaemon").c_str() << ")" << exit(FatalError);
+        << (case_/share_.name("log.gbmDaemon")).c_str() << ")" << exit(FatalError);
 
     ::abort();
 }

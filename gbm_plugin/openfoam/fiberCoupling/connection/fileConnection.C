@@ -12,11 +12,12 @@
 Foam::fileConnection::fileConnection
 (
     const dictionary& coupling,
-    const fileName& caseFolder
+    const fileName& caseFolder,
+    const daemonShare& share
 )
 :
-    connection(coupling, caseFolder),
-    folder_(case_/"exchange"),
+    connection(coupling, caseFolder, share),
+    folder_(case_/share.name("exchange")),
     sent_(0),
     received_(0)
 {
@@ -30,7 +31,7 @@ Foam::fileConnection::fileConnection
             fail
             (
                 "no daemon answers: there is no file " + folder_/"session"
-              + "; start it with 'gbm daemon " + case_ + "'"
+              + "; start it with '" + startCommand() + "'"
             );
         }
         ::usleep(20000);

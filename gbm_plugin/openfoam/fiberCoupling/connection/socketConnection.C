@@ -19,13 +19,15 @@ Foam::socketConnection::socketConnection
 (
     const dictionary& coupling,
     const fileName& caseFolder,
+    const daemonShare& share,
     const bool tcp
 )
 :
-    connection(coupling, caseFolder),
-    socket_(-1)
+    connection(coupling, caseFolder, share),
+    socket_(-1),
+    address_(share.name("gbm", tcp ? ".tcp" : ".sock"))
 {
-    peer_ = case_/(tcp ? "gbm.tcp" : "gbm.sock");
+    peer_ = case_/address_;
 
     const auto end = deadline();
     string why;
@@ -41,7 +43,7 @@ Foam::socketConnection::socketConnection
                 fail
                 (
                     "no daemon answers: " + why
-                  + "; start it with 'gbm daemon " + case_ + "'"
+                  + "; start it with '" + startCommand() + "'"
                 );
             }
             ::usleep(20000);
@@ -73,7 +75,7 @@ int Foam::socketConnection::openUnix(string& why)
     std::snprintf
     (
         address.sun_path, sizeof(address.sun_path),
-        "/proc/self/fd/%d/gbm.sock", folder
+        "/proc/self/fd/%d/%s", folder, address_.c_str()
     );
 
     const int rc =
@@ -94,7 +96,7 @@ int Foam::socketConnection::openUnix(string& why)
 
 int Foam::socketConnection::openTcp(string& why)
 {
-    const fileName file(case_/"gbm.tcp");
+    const fileName file(case_/address_);
     if (!isFile(file, false))
     {
         why = "there is no file " + file;

@@ -1,6 +1,4 @@
 #include "lattice.H"
-#include "globalIndex.H"
-#include "PstreamBuffers.H"
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
@@ -16,7 +14,13 @@ Foam::autoPtr<Foam::lattice> Foam::lattice::New
     {
         return nullptr;
     }
-    l->connect();
+
+    labelList remoteSlots;
+    labelList remoteNumbers;
+    l->layOut(remoteSlots, remoteNumbers);
+    l->connect(remoteSlots, remoteNumbers);
+    l->divide();
+
     return l;
 }
 
@@ -96,58 +100,19 @@ Foam::label Foam::lattice::slot(const Vector<label>& place) const
 }
 
 
-Foam::labelList Foam::lattice::globalCells
+Foam::Vector<Foam::label> Foam::lattice::coarsePlace
 (
-    const globalIndex& cells,
-    const labelUList& numbers
+    const Vector<label>& i
 ) const
 {
-    // A directory spread over the ranks: rank r keeps the numbers of its
-    // equal share. Every cell reports there; then the directory is read.
-    const label total = n_.x()*n_.y()*n_.z();
-    const label share = (total + Pstream::nProcs() - 1)/Pstream::nProcs();
-    const label mine =
-        max(label(0), min(share, total - share*Pstream::myProcNo()));
-    const globalIndex directory(mine);
-
-    List<DynamicList<labelPair>> reports(Pstream::nProcs());
-    forAll(mesh_.cellCentres(), celli)
-    {
-        const label i = number(place(mesh_.cellCentres()[celli]));
-        reports[i/share].append(labelPair(i % share, cells.toGlobal(celli)));
-    }
-
-    PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
-    forAll(reports, rank)
-    {
-        UOPstream to(rank, buffers);
-        to << reports[rank];
-    }
-    buffers.finishedSends();
-
-    labelList entries(mine, -1);
-    forAll(reports, rank)
-    {
-        UIPstream from(rank, buffers);
-        const List<labelPair> pairs(from);
-        for (const labelPair& pair : pairs)
-        {
-            entries[pair.first()] = pair.second();
-        }
-    }
-
-    // share*rank + offset is the directory's own global numbering, as all
-    // shares before the last one are full
-    labelList wanted(numbers);
-    List<Map<label>> compact;
-    const mapDistribute map(directory, wanted, compact);
-    map.distribute(entries);
-
-    return labelList(UIndirectList<label>(entries, wanted));
+    return Vector<label>
+    (
+        i.x()/coarse_.x(), i.y()/coarse_.y(), i.z()/coarse_.z()
+    );
 }
 
 
-void Foam::lattice::connect()
+void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
 {
     const vectorField& centres = mesh_.cellCentres();
 
@@ -160,8 +125,11 @@ void Foam::lattice::connect()
         first_ = celli ? min(first_, i) : i;
         last = celli ? max(last, i) : i;
     }
-    first_ -= Vector<label>::one;
-    last += Vector<label>::one;
+    blocks_.setSize(Pstream::nProcs());
+    blocks_[Pstream::myProcNo()] = {first_, last};
+
+    first_ -= layers*Vector<label>::one;
+    last += layers*Vector<label>::one;
     extent_ = last - first_ + Vector<label>::one;
     slots_.setSize(extent_.x()*extent_.y()*extent_.z(), -1);
 
@@ -172,94 +140,100 @@ void Foam::lattice::connect()
         local.insert(number(place(centres[celli])), celli);
     }
 
-    DynamicList<label> remoteSlots;
-    DynamicList<label> remoteNumbers;
+    DynamicList<label> slots;
+    DynamicList<label> numbers;
 
     forAll(centres, celli)
     {
         const Vector<label> c(place(centres[celli]));
 
-        for (label k = -1; k <= 1; ++k)
-        for (label j = -1; j <= 1; ++j)
-        for (label i = -1; i <= 1; ++i)
+        for (label k = -layers; k <= layers; ++k)
+        for (label j = -layers; j <= layers; ++j)
+        for (label i = -layers; i <= layers; ++i)
         {
             const Vector<label> neighbour(c + Vector<label>(i, j, k));
             label& s = slots_[slot(neighbour)];
 
             if (s == -1)
             {
-                const label cell = local.lookup(number(neighbour), -1);
-                s = cell;
+                s = local.lookup(number(neighbour), -1);
 
-                if (cell == -1)
+                if (s == -1)
                 {
                     s = -2;     // asked for
-                    remoteSlots.append(slot(neighbour));
-                    remoteNumbers.append(number(neighbour));
+                    slots.append(slot(neighbour));
+                    numbers.append(number(neighbour));
                 }
             }
         }
     }
 
-    const globalIndex cells(mesh_.nCells());
-    labelList elements(globalCells(cells, remoteNumbers));
-    List<Map<label>> compact;
-    map_.reset(new mapDistribute(cells, elements, compact));
-
-    forAll(remoteSlots, i)
-    {
-        slots_[remoteSlots[i]] = elements[i];
-    }
+    remoteSlots.transfer(slots);
+    remoteNumbers.transfer(numbers);
 }
 
 
 // * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
 
-Foam::label Foam::lattice::findCell(const point& p) const
+Foam::List<Foam::DynamicList<Foam::label>> Foam::lattice::candidates
+(
+    const UList<point>& points
+) const
 {
-    const Vector<label> i(place(p));
+    List<DynamicList<label>> result(Pstream::nProcs());
 
-    for (direction d = 0; d < vector::nComponents; ++d)
+    forAll(points, p)
     {
-        if (i[d] <= first_[d] || i[d] >= first_[d] + extent_[d] - 1)
+        const Vector<label> i(place(points[p]));
+        const Vector<label> c(coarsePlace(i));
+
+        for
+        (
+            const label rank :
+            ranks_[c.x() + nCoarse_.x()*(c.y() + nCoarse_.y()*c.z())]
+        )
         {
-            return -1;
+            const Vector<label>& first = blocks_[rank].first();
+            const Vector<label>& last = blocks_[rank].second();
+
+            if
+            (
+                first.x() <= i.x() && i.x() <= last.x()
+             && first.y() <= i.y() && i.y() <= last.y()
+             && first.z() <= i.z() && i.z() <= last.z()
+            )
+            {
+                result[rank].append(p);
+            }
         }
     }
 
-    const label value = slots_[slot(i)];
-
-    return value < mesh_.nCells() ? value : -1;
+    return result;
 }
 
 
-void Foam::lattice::stencil
+Foam::label Foam::lattice::findCell(const point& p) const
+{
+    const label celli = slots_[slot(place(p))];
+
+    return celli < mesh_.nCells() ? celli : -1;
+}
+
+
+const Foam::label* Foam::lattice::around
 (
     const point& p,
-    FixedList<label, 8>& values,
-    FixedList<scalar, 8>& weights
+    vector& weights
 ) const
 {
     Vector<label> lower;
-    vector w;
 
     for (direction d = 0; d < vector::nComponents; ++d)
     {
         const scalar x = (p[d] - box_.min()[d])/h_[d] - 0.5;
         lower[d] = label(std::floor(x));
-        w[d] = x - lower[d];
+        weights[d] = x - lower[d];
     }
 
-    const label s = slot(lower);
-
-    for (label corner = 0; corner < 8; ++corner)
-    {
-        const label i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
-
-        values[corner] = slots_[s + i + extent_.x()*(j + extent_.y()*k)];
-        weights[corner] =
-            (i ? w.x() : 1 - w.x())
-           *(j ? w.y() : 1 - w.y())
-           *(k ? w.z() : 1 - w.z());
-    }
+    return slots_.cdata() + slot(lower);
 }

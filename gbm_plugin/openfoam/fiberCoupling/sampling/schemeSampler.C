@@ -1,47 +1,67 @@
 #include "schemeSampler.H"
+#include "fvc.H"
 #include "interpolation.H"
 
-Foam::schemeSampler::schemeSampler
+namespace
+{
+
+using namespace Foam;
+
+//- Values of a field at points, in lists of 'stride' numbers from 'start' on
+template<class Type>
+void interpolate
 (
     const word& scheme,
-    const fvMesh& mesh,
-    const periodicBox& box,
-    autoPtr<lattice>&& places
+    const GeometricField<Type, fvPatchField, volMesh>& field,
+    const UList<point>& points,
+    const labelUList& cells,
+    scalar* out,
+    const label stride
 )
-:
-    sampler(mesh, box, std::move(places)),
-    scheme_(scheme)
-{}
-
-
-template<class Type>
-Foam::Field<Type> Foam::schemeSampler::interpolate
-(
-    const GeometricField<Type, fvPatchField, volMesh>& field
-) const
 {
-    const autoPtr<interpolation<Type>> scheme
+    const autoPtr<interpolation<Type>> values
     (
-        interpolation<Type>::New(scheme_, field)
+        interpolation<Type>::New(scheme, field)
     );
 
-    Field<Type> result(points_.size());
-    forAll(result, i)
+    forAll(points, i)
     {
-        result[i] = scheme->interpolate(points_[i], cells_[i]);
+        const Type value(values->interpolate(points[i], cells[i]));
+        for (direction c = 0; c < pTraits<Type>::nComponents; ++c)
+        {
+            out[i*stride + c] = value[c];
+        }
+    }
+}
+
+}
+
+
+Foam::scalarList Foam::schemeSampler::sample
+(
+    const volVectorField& U,
+    const ambient wanted,
+    const UList<point>& points,
+    const labelUList& cells
+) const
+{
+    const label stride = 3 + components(wanted);
+    scalarList values(points.size()*stride);
+    scalar* out = values.begin();
+
+    interpolate(scheme_, U, points, cells, out, stride);
+
+    if (wanted == ROTATION)
+    {
+        const volVectorField rotation(0.5*fvc::curl(U));
+        interpolate(scheme_, rotation, points, cells, out + 3, stride);
+    }
+    else if (wanted == GRADIENT)
+    {
+        // OpenFOAM's gradient is the transpose of du_i/dx_j
+        const volTensorField gradient(fvc::grad(U)().T());
+        interpolate(scheme_, gradient, points, cells, out + 3, stride);
     }
 
-    return result;
-}
-
-
-Foam::vectorField Foam::schemeSampler::sample(const volVectorField& f) const
-{
-    return interpolate(f);
-}
-
-
-Foam::tensorField Foam::schemeSampler::sample(const volTensorField& f) const
-{
-    return interpolate(f);
+    return values;
 }

@@ -1,0 +1,178 @@
+#include "beadExchange.H"
+#include "PstreamBuffers.H"
+
+// * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
+
+Foam::beadExchange::beadExchange(const periodicBox& box, const locator& places)
+:
+    box_(box),
+    places_(places),
+    brought_(0),
+    starts_(Pstream::nProcs() + 1, Zero)
+{}
+
+
+// * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
+
+void Foam::beadExchange::take
+(
+    const labelUList& numbers,
+    const UList<point>& points
+)
+{
+    forAll(points, i)
+    {
+        const label celli = places_.findCell(points[i]);
+
+        if (celli != -1)
+        {
+            numbers_.append(numbers[i]);
+            points_.append(points[i]);
+            cells_.append(celli);
+        }
+    }
+}
+
+
+// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
+
+void Foam::beadExchange::locate(const UList<point>& positions)
+{
+    brought_ = positions.size();
+    numbers_.clear();
+    points_.clear();
+    cells_.clear();
+
+    List<point> wrapped(positions.size());
+    forAll(wrapped, i)
+    {
+        wrapped[i] = box_.wrap(positions[i]);
+    }
+    const List<DynamicList<label>> candidates(places_.candidates(wrapped));
+    const label me = Pstream::myProcNo();
+
+    PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
+    labelList received(Pstream::nProcs(), Zero);    // bytes from each rank
+    if (Pstream::parRun())
+    {
+        forAll(candidates, rank)
+        {
+            if (rank != me && candidates[rank].size())
+            {
+                UOPstream to(rank, buffers);
+                to  << static_cast<const labelUList&>(candidates[rank])
+                    << List<point>
+                       (
+                           UIndirectList<point>(wrapped, candidates[rank])
+                       );
+            }
+        }
+        buffers.finishedSends(received);
+    }
+
+    forAll(candidates, rank)
+    {
+        starts_[rank] = numbers_.size();
+        if (rank == me)
+        {
+            take
+            (
+                candidates[me],
+                List<point>(UIndirectList<point>(wrapped, candidates[me]))
+            );
+        }
+        else if (received[rank])
+        {
+            UIPstream from(rank, buffers);
+            const labelList numbers(from);
+            const List<point> points(from);
+            take(numbers, points);
+        }
+    }
+    starts_.last() = numbers_.size();
+}
+
+
+Foam::label Foam::beadExchange::rankOf(const label i) const
+{
+    label rank = 0;
+    while (starts_[rank + 1] <= i)
+    {
+        ++rank;
+    }
+    return rank;
+}
+
+
+Foam::scalarList Foam::beadExchange::collect
+(
+    const UList<scalar>& sampled,
+    const label n
+) const
+{
+    scalarList result(brought_*n);
+    label found = 0;
+
+    const auto put = [&](const labelUList& numbers, const scalar* values)
+    {
+        for (const label number : numbers)
+        {
+            std::copy_n(values, n, result.begin() + n*number);
+            values += n;
+        }
+        found += numbers.size();
+    };
+    const auto numbersFor = [&](const label rank)
+    {
+        return SubList<label>
+        (
+            numbers_, starts_[rank + 1] - starts_[rank], starts_[rank]
+        );
+    };
+
+    const label me = Pstream::myProcNo();
+    put(numbersFor(me), sampled.cdata() + n*starts_[me]);
+
+    if (Pstream::parRun())
+    {
+        PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
+        labelList received;
+        for (label rank = 0; rank < Pstream::nProcs(); ++rank)
+        {
+            const SubList<label> numbers(numbersFor(rank));
+            if (rank != me && numbers.size())
+            {
+                UOPstream to(rank, buffers);
+                to  << static_cast<const labelUList&>(numbers)
+                    << static_cast<const UList<scalar>&>
+                       (
+                           SubList<scalar>
+                           (
+                               sampled, n*numbers.size(), n*starts_[rank]
+                           )
+                       );
+            }
+        }
+        buffers.finishedSends(received);
+
+        for (label rank = 0; rank < Pstream::nProcs(); ++rank)
+        {
+            if (rank != me && received[rank])
+            {
+                UIPstream from(rank, buffers);
+                const labelList numbers(from);
+                const scalarList values(from);
+                put(numbers, values.cdata());
+            }
+        }
+    }
+
+    if (found != brought_)
+    {
+        FatalErrorInFunction
+            << found << " of " << brought_ << " beads were found in the mesh"
+            << exit(FatalError);
+    }
+
+    return result;
+}
