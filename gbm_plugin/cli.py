@@ -122,6 +122,8 @@ def _parser() -> argparse.ArgumentParser:
     kind.add_argument(
         "--transport", choices=("socket", "tcp", "file"), default="socket", help="(default: socket)"
     )
+    kind.add_argument("--ranks", type=int, default=1, help="of OpenFOAM, in slabs (default: 1)")
+    kind.add_argument("--daemons", type=int, default=1, help="that share the fibers (default: 1)")
     _add_json(kind)
 
     kind = kinds.add_parser(
@@ -200,8 +202,8 @@ def _validate(arguments) -> dict:
 def _bench_coupling(arguments) -> dict:
     from .bench import coupling
 
-    sizes = {name: getattr(arguments, name) for name in ("cells", "fibers", "beads", "steps", "transport")}
-    result = coupling.run(arguments.case, **sizes)
+    names = ("cells", "fibers", "beads", "steps", "transport", "ranks", "daemons")
+    result = coupling.run(arguments.case, **{name: getattr(arguments, name) for name in names})
     print(coupling.table(result))
     return result
 

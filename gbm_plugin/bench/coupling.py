@@ -1,4 +1,4 @@
-"""What the coupling costs a step of OpenFOAM: waiting, derivative of U, location and interpolation, sending."""
+"""What the coupling costs a step of OpenFOAM: waiting for daemons, finding beads, sampling, sending."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ from pathlib import Path
 import numpy as np
 
 from ..case.copies import copy_case
+from ..case.share import all_shares
 from ..output.dat import read_dat
 from ..run import run as run_case
 
-FIBERS = """coupling {{ transport {transport}; }}
+FIBERS = """coupling {{ transport {transport}; daemons {daemons}; }}
 recordInterval {never};
 families {{ bench {{ count {fibers}; beads {beads}; length {length}; bendingStiffness 1e-5; seed 1; }} }}
 """
+SLABS = """numberOfSubdomains {ranks};
+method simple;
+simpleCoeffs {{ n (1 1 {ranks}); delta 0.001; }}
+"""
+PARTS = ("wait", "location", "sampling", "sending")  # columns of coupling.dat
+START = 5  # the first steps are corrected, and compile
 
 
 def run(
@@ -24,10 +31,13 @@ def run(
     beads: int = 20,
     steps: int = 30,
     transport: str = "socket",
+    ranks: int = 1,
+    daemons: int = 1,
 ) -> dict:
     """Median seconds a step, of a copy of `case` with this many cells in each direction and one family.
 
-    Raises CaseError and RunError as `run.run`.
+    "daemon" is the time from a sample's arrival at the slowest daemon to its next positions, which a step of the flow
+    hides as long as it is longer. Raises CaseError and RunError as `run.run`.
     """
     case = Path(case)
     with tempfile.TemporaryDirectory(prefix="gbm-bench-") as folder:
@@ -37,37 +47,45 @@ def run(
             "system/blockMeshDict": {"n": cells},
         }
         sizes = {"fibers": fibers, "beads": beads, "length": 0.1 * beads, "never": 10 * steps}
-        words = FIBERS.format(transport=transport, **sizes)
-        copy_case(case, copy, entries, {"constant/fiberProperties": words})
-        run_case(copy)
-        table = read_dat(copy / "postProcessing/fibers", "coupling.dat")
-    late = slice(5, None)  # the first steps are corrected, and compile
-    parts = {
-        name: float(np.median(table[name][late]))
-        for name in ("wait", "derivative", "interpolation", "sending")
-    }
-    step = float(np.median(np.diff(table["sentAt"])[late]))
+        texts = {
+            "constant/fiberProperties": FIBERS.format(transport=transport, daemons=daemons, **sizes),
+            "system/decomposeParDict": SLABS.format(ranks=ranks),
+        }
+        copy_case(case, copy, entries, texts)
+        run_case(copy, parallel=ranks > 1)
+        results = copy / "postProcessing/fibers"
+        table = read_dat(results, "coupling.dat")
+        of_daemons = [read_dat(results, share.name("daemon", ".dat")) for share in all_shares(daemons)]
+    parts = {name: float(np.median(table[name][START:])) for name in PARTS}
+    step = float(np.median(np.diff(table["sentAt"])[START:]))
+    busy = [np.median((d["sentAt"][1:] - d["arrivedAt"][:-1])[START:]) for d in of_daemons]
     return {
         "cells": cells,
         "fibers": fibers,
         "beads": beads,
         "transport": transport,
+        "ranks": ranks,
+        "daemons": daemons,
         "step": step,
         **parts,
         "share": sum(parts.values()) / step,
+        "daemon": float(max(busy)),
+        "positions_bytes": 24 * fibers * beads,
+        "sample_bytes": 48 * fibers * beads,
     }
 
 
 def table(result: dict) -> str:
     """The result of `run` as text."""
     lines = [
-        f"{result['cells']}^3 cells, {result['fibers']} fibers x {result['beads']} beads, {result['transport']}: "
-        f"step {1e3 * result['step']:.1f} ms"
+        f"{result['cells']}^3 cells, {result['fibers']} fibers x {result['beads']} beads, {result['transport']}, "
+        f"{result['ranks']} rank(s), {result['daemons']} daemon(s): step {1e3 * result['step']:.1f} ms"
     ]
-    for name in ("wait", "derivative", "interpolation", "sending"):
+    for name in PARTS:
         seconds = result[name]
         lines.append(f"    {name:<16}{1e3 * seconds:8.2f} ms {seconds / result['step']:8.1%}")
     lines.append(
         f"    {'coupling':<16}{1e3 * result['step'] * result['share']:8.2f} ms {result['share']:8.1%}"
     )
+    lines.append(f"    beside it, the slowest daemon is busy for {1e3 * result['daemon']:.2f} ms")
     return "\n".join(lines)

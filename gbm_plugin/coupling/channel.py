@@ -24,7 +24,7 @@ class Channel(ABC):
         self._log = log
 
     @abstractmethod
-    def _write(self, head: bytes, payload: bytes | memoryview) -> None: ...
+    def _write(self, *parts: bytes | memoryview) -> None: ...
 
     @abstractmethod
     def _read(self, size: int) -> bytes | bytearray:

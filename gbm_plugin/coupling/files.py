@@ -30,13 +30,12 @@ class FileChannel(Channel):
     def incoming(self) -> Path:
         return self._folder / f"{self._session}.flow.{self._received}"
 
-    def _write(self, head: bytes, payload: bytes | memoryview) -> None:
+    def _write(self, *parts: bytes | memoryview) -> None:
         target = self._folder / f"{self._session}.fibers.{self._sent}"
         part = target.with_name(target.name + ".part")
         try:
             with part.open("wb") as file:
-                file.write(head)
-                file.write(payload)
+                file.writelines(parts)
             os.replace(part, target)
         except OSError as error:
             raise self.error(f"cannot write {target}: {error.strerror}") from None

@@ -52,9 +52,9 @@ class SocketChannel(Channel):
             second.sendall(Message(Kind.ERROR, 0, 0.0, text).encode())
             _part(second)
 
-    def _write(self, head: bytes, payload: bytes | memoryview) -> None:
+    def _write(self, *parts: bytes | memoryview) -> None:
         deadline = time.monotonic() + self.timeout
-        for view in (memoryview(head), memoryview(payload)):
+        for view in map(memoryview, parts):
             while view:
                 self._wait(select.POLLOUT, deadline)
                 try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fluidfoam
 import numpy as np
 import pytest
+from scipy.interpolate import KroghInterpolator
 
 from gbm_plugin.case.openfoam import utility
 
@@ -67,6 +68,61 @@ def test_velocity_and_rotation_are_those_of_the_written_fields(case, positions):
     np.testing.assert_allclose(rotation, 0.5 * trilinear(omega, positions), atol=1e-11)
 
 
+def test_cubic_is_lagranges(case, positions):
+    """Values and derivatives by scipy's polynomials through the four cells around each bead, along each direction."""
+    path = case(steps=1, interpolation="cubic")
+    _, samples = probe(path, positions, need="gradient")
+    u = read(path, "0", "U", 3)
+    _, velocity, gradient = samples[0]
+    x = np.mod(positions, BOX) * (CELLS / BOX) - 0.5
+    low = np.floor(x).astype(int)
+    for bead in range(0, len(positions), 7):
+        block = u[np.ix_(range(3), *((low[bead, d] + np.arange(-1, 3)) % CELLS for d in range(3)))]
+
+        def along(values, place, derivative):
+            polynomial = KroghInterpolator(np.arange(-1.0, 3.0), np.moveaxis(values, -1, 0))
+            return polynomial.derivative(place) if derivative else polynomial(place)
+
+        for derivative in (None, 0, 1, 2):
+            values = block
+            for d in (2, 1, 0):
+                values = along(values, x[bead, d] - low[bead, d], derivative == d)
+            if derivative is None:
+                np.testing.assert_allclose(velocity[bead], values, atol=1e-12)
+            elif bead < 40:  # at cell centres derivatives jump, and rounding chooses the side
+                np.testing.assert_allclose(gradient[bead, :, derivative], values * CELLS / BOX, atol=1e-11)
+
+
+@pytest.mark.parametrize("scheme, order", [("trilinear", 2), ("cubic", 4)])
+def test_order_of_the_interpolation(case, scheme, order):
+    """Velocity of a field of modes |m| <= 2, at its own points; its gradient has an order of 2 or 3."""
+    points = np.random.default_rng(3).uniform(0, BOX, (200, 3))
+    errors = []
+    for cells in (16, 32):
+        path = case(str(cells), steps=1, cells=cells, interpolation=scheme, initial=ABC)
+        _, samples = probe(path, points, need="gradient")
+        _, velocity, gradient = samples[0]
+        exact, slope = abc_flow(points)
+        errors.append([np.abs(velocity - exact).max(), np.abs(gradient - slope).max()])
+    found = np.log2(np.divide(*errors))
+    assert abs(found[0] - order) < 0.3, errors
+    assert found[1] > {2: 1.7, 4: 2.7}[order], errors
+
+
+ABC = "field modes; modes (((0 0 2) (0 1 0) (-1 0 0)) ((1 0 0) (0 0 1) (0 -1 0)) ((0 2 0) (1 0 0) (0 0 -1)));"
+
+
+def abc_flow(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The field of ABC, Re a exp(i m.x), and its gradient du_i/dx_j."""
+    (sx, sy, sz), (cx, cy, cz) = (f(x * (1, 2, 2)).T for f in (np.sin, np.cos))
+    u = np.stack([sz + cy, cz + sx, cx + sy], axis=-1)
+    gradient = np.zeros((len(x), 3, 3))
+    gradient[:, 0, 2], gradient[:, 0, 1] = 2 * cz, -2 * sy
+    gradient[:, 1, 2], gradient[:, 1, 0] = -2 * sz, cx
+    gradient[:, 2, 0], gradient[:, 2, 1] = -sx, 2 * cy
+    return u, gradient
+
+
 def test_gradient_on_the_wire_is_du_i_dx_j(case):
     """Simple shear u_x = sin(y): only [0, 1] is there, cos(y) to the second order of central differences."""
     path = case(steps=1, fv_options="", initial="field modes; modes (((0 1 0) (0 0 0) (-1 0 0)));")
@@ -80,13 +136,14 @@ def test_gradient_on_the_wire_is_du_i_dx_j(case):
     assert np.abs(others).max() < 1e-12
 
 
+@pytest.mark.parametrize("scheme", ["trilinear", "cubic"])
 @pytest.mark.parametrize(
     "division", [(2, (1, 1, 2)), (4, (2, 2, 1)), (3, None)], ids=["slabs", "columns", "manual"]
 )
-def test_samples_do_not_depend_on_the_decomposition(case, positions, division):
+def test_samples_do_not_depend_on_the_decomposition(case, positions, division, scheme):
     """The fields are the same at step 0, so that samples agree to rounding, points on rank faces included."""
     ranks, n = division
-    serial, parallel = case("serial", steps=1), case("parallel", steps=1)
+    serial, parallel = (case(name, steps=1, interpolation=scheme) for name in ("serial", "parallel"))
     divide(parallel, ranks, n)
     _, expected = probe(serial, positions)
     _, found = probe(parallel, positions, ranks=ranks)

@@ -1,7 +1,8 @@
 #include "sampler.H"
 #include "cellSearch.H"
+#include "interpolants.H"
+#include "latticeSampler.H"
 #include "schemeSampler.H"
-#include "trilinearSampler.H"
 #include "interpolation.H"
 #include "FlatOutput.H"
 
@@ -17,23 +18,33 @@ Foam::autoPtr<Foam::sampler> Foam::sampler::New
 
     autoPtr<lattice> cells(lattice::New(mesh, box));
 
-    if (scheme == "trilinear")
+    if (scheme == "trilinear" || scheme == "cubic")
     {
         if (!cells.valid())
         {
             FatalIOErrorInFunction(fiberProperties)
-                << "interpolation trilinear needs a box of equal cells, which"
-                << " this mesh is not; use one of OpenFOAM's own schemes, as"
-                << " cellPoint" << exit(FatalIOError);
+                << "interpolation " << scheme << " needs a box of equal cells,"
+                << " which this mesh is not; use one of OpenFOAM's own"
+                << " schemes, as cellPoint" << exit(FatalIOError);
         }
-        return autoPtr<sampler>(new trilinearSampler(std::move(cells)));
+        if (scheme == "cubic")
+        {
+            return autoPtr<sampler>
+            (
+                new latticeSampler<cubic>(std::move(cells))
+            );
+        }
+        return autoPtr<sampler>
+        (
+            new latticeSampler<trilinear>(std::move(cells))
+        );
     }
 
     if (!interpolation<vector>::dictionaryConstructorTablePtr_->found(scheme))
     {
         FatalIOErrorInFunction(fiberProperties)
             << "interpolation '" << scheme << "' is unknown to OpenFOAM;"
-            << " allowed: trilinear "
+            << " allowed: trilinear cubic "
             << flatOutput
                (
                    interpolation<vector>::dictionaryConstructorTablePtr_
