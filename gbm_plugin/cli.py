@@ -68,9 +68,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     sub.add_argument(
         "--flow",
-        choices=("openfoam", "spectral"),
+        choices=("openfoam", "spectral", "stored"),
         default="openfoam",
-        help="what solves the flow: OpenFOAM, or the pseudo-spectral solver, whose results go to CASE/spectral",
+        help="OpenFOAM; the pseudo-spectral solver, whose results go to CASE/spectral; or velocity fields that "
+        "are stored in the time folders or in --fields, with results in CASE/stored",
+    )
+    sub.add_argument("--fields", metavar="FILE", help="with stored: an HDF5 file of fields (docs/files.md)")
+    sub.add_argument(
+        "--in-time",
+        choices=("cubic", "linear"),
+        default="cubic",
+        help="with stored: interpolation between the times of fields (default: cubic)",
     )
     sub.add_argument("--threads", type=int, default=1, help="of the spectral solver (default: 1)")
     sub.add_argument(
@@ -145,16 +153,21 @@ def _add_json(sub: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments) -> None:
-    from .run import run, run_spectral
+    from . import run
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, until the run has its own way
-    if arguments.flow == "openfoam":
-        run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
-        return
-    if arguments.parallel:
+    if arguments.parallel and arguments.flow != "openfoam":
         raise ValueError("--parallel is for OpenFOAM; the spectral solver takes --threads")
-    options = {name: getattr(arguments, name) for name in ("fresh", "threads", "precision", "device")}
-    run_spectral(arguments.case, **options)
+    if arguments.fields is not None and arguments.flow != "stored":
+        raise ValueError("--fields goes with --flow stored")
+    if arguments.flow == "openfoam":
+        run.run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
+    elif arguments.flow == "spectral":
+        options = {name: getattr(arguments, name) for name in ("fresh", "threads", "precision", "device")}
+        run.run_spectral(arguments.case, **options)
+    else:
+        options = {name: getattr(arguments, name) for name in ("fresh", "fields", "in_time")}
+        run.run_stored(arguments.case, **options)
 
 
 def _daemon(arguments) -> None:
