@@ -12,7 +12,7 @@ from pathlib import Path
 
 from . import __version__
 
-STUDIES = ("convergence",)  # modules of validation/, each with run, table and draw
+STUDIES = ("convergence", "replay")  # modules of validation/, each with run, table and draw
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -77,7 +77,6 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument(
         "--in-time",
         choices=("cubic", "linear"),
-        default="cubic",
         help="with stored: interpolation between the times of fields (default: cubic)",
     )
     sub.add_argument("--threads", type=int, default=1, help="of the spectral solver (default: 1)")
@@ -104,7 +103,8 @@ def _parser() -> argparse.ArgumentParser:
         "--study",
         choices=STUDIES,
         default="convergence",
-        help="convergence: errors of flow and fibers as cells and step shrink (default)",
+        help="convergence: errors of flow and fibers as cells and step shrink (default); "
+        "replay: distance of fibers in stored fields to the coupled run, by the interval between fields",
     )
     sub.add_argument("--cells", type=int, nargs="+", help="in each direction (default: as the study needs)")
     sub.add_argument("--time-step", type=float, help="of the first, in proportion for the others [s]")
@@ -158,16 +158,17 @@ def _run(arguments) -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, until the run has its own way
     if arguments.parallel and arguments.flow != "openfoam":
         raise ValueError("--parallel is for OpenFOAM; the spectral solver takes --threads")
-    if arguments.fields is not None and arguments.flow != "stored":
-        raise ValueError("--fields goes with --flow stored")
+    for option in ("fields", "in_time"):
+        if getattr(arguments, option) is not None and arguments.flow != "stored":
+            raise ValueError(f"--{option.replace('_', '-')} goes with --flow stored")
     if arguments.flow == "openfoam":
         run.run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
     elif arguments.flow == "spectral":
         options = {name: getattr(arguments, name) for name in ("fresh", "threads", "precision", "device")}
         run.run_spectral(arguments.case, **options)
     else:
-        options = {name: getattr(arguments, name) for name in ("fresh", "fields", "in_time")}
-        run.run_stored(arguments.case, **options)
+        in_time = arguments.in_time or "cubic"
+        run.run_stored(arguments.case, fresh=arguments.fresh, fields=arguments.fields, in_time=in_time)
 
 
 def _daemon(arguments) -> None:
