@@ -105,11 +105,7 @@ def _range(scene: Scene, flow: StoredFlow) -> tuple[float, float]:
             f"{scene.end_time:g} there is no step of {step:g} within the fields, {first:.9g} to {last:.9g}"
         )
     end = begin + steps * step
-    inside = (flow.times > begin - slack) & (flow.times < end + slack)
-    # with the field on either side, which is needed for what is between
-    inside[:-1] |= inside[1:]
-    inside[1:] |= inside[:-1]
-    refuse_gaps(flow.times[inside])
+    refuse_gaps(flow.times, begin, end)
     return begin, end
 
 

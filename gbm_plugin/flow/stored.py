@@ -147,12 +147,15 @@ class StoredFlow:
         return velocity
 
 
-def refuse_gaps(times: NDArray) -> None:
-    """ValueError where a field seems to be missing: an interval between two times that is longer than those
-    beside it and than most. Times that are written more or less often from some time on are none."""
+def refuse_gaps(times: NDArray, begin: float, end: float) -> None:
+    """ValueError where a field between begin and end seems to be missing: an interval between two times that is
+    longer than those beside it and than most. Times that are written more or less often from some time on are none.
+    """
     intervals = np.diff(times)
     usual = np.median(intervals)
     for n, interval in enumerate(intervals):
+        if times[n + 1] < begin + SAME_TIME * interval or times[n] > end - SAME_TIME * interval:
+            continue
         beside = [intervals[m] for m in (n - 1, n + 1) if 0 <= m < len(intervals)]
         if beside and interval > GAP * max(usual, *beside):
             raise ValueError(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import logging
 import math
+import shutil
 import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
@@ -51,7 +52,7 @@ def run(
     """Distances of replays to the coupled run, at its end.
 
     case: whose flow is taken: forcing, viscosity, initial field, schemes. cells: one number, in each direction.
-    time_step [s], steps: of the run that is stored, a power of two. development: time before it, without
+    time_step [s], steps: of the run that is stored, a power of two. development: least time before it, without
     fibers [s]. Distance: rms over the end beads, over the fiber length, for each family. Raises as
     `gbm_plugin.run.run`.
     """
@@ -62,7 +63,7 @@ def run(
     with tempfile.TemporaryDirectory(prefix="gbm-validate-") as folder:
         live = _live(Path(case), Path(folder), cells[0], time_step, steps, development)
         tau = _kolmogorov_time(live)
-        size = (live / f"{time_step:.8g}/U").stat().st_size
+        size = (live / f"{read_scene(live).end_time:.8g}/U").stat().st_size
         rows = []
         for in_time, power in itertools.product(POINTS_IN_TIME, range(int(math.log2(steps)) - 1)):
             every = 2**power
@@ -87,24 +88,26 @@ def run(
 
 
 def _live(case: Path, folder: Path, n: int, step: float, steps: int, development: float) -> Path:
-    """A coupled run that wrote every step, from a developed flow."""
+    """A coupled run that wrote every step, continued from a developed flow with all that its solver remembers:
+    a first step from a velocity alone is not smooth in time."""
     before, live = folder / "development", folder / "live"
-    developed = max(1, round(development / step))
-    for copy, count, every, fibers in (
-        (before, developed, developed, NOBODY),
-        (live, steps, 1, FIBERS.format(steps=steps)),
+    developed = steps * max(1, math.ceil(development / (step * steps)))  # records fall on the last step
+    start = developed * step
+    for copy, begin, end, every, fibers in (
+        (before, 0, start, developed, NOBODY),
+        (live, start, start + steps * step, 1, FIBERS.format(steps=steps)),
     ):
-        control = {
-            "deltaT": step,
-            "endTime": count * step,
-            "writeControl": "timeStep",
-            "writeInterval": every,
-        }
+        control = {"deltaT": step, "startTime": begin, "endTime": end}
+        control |= {"writeControl": "timeStep", "writeInterval": every}
         entries = {"system/controlDict": control, "system/blockMeshDict": {"n": n}}
         copy_case(case, copy, entries, {"constant/fiberProperties": fibers})
         if copy == live:
-            (copy / "system/initialFieldDict").unlink()
-            (copy / "0.orig/U").write_bytes((before / f"{developed * step:.8g}/U").read_bytes())
+            name = f"{start:.8g}"
+            for part in ("U", "p", "phi", "U_0", "uniform/time", "uniform/linearForcing"):
+                target = live / name / part
+                target.parent.mkdir(parents=True, exist_ok=True)
+                if (before / name / part).is_file():
+                    shutil.copy(before / name / part, target)
         run_openfoam(copy)
     return live
 

@@ -192,7 +192,7 @@ def test_gaps_in_time():
     """A missing field is a gap; another interval from some time on, or a run that was stopped, is none."""
     for times in ([0, 1, 2, 4, 5], [0, 2, 3, 4], [0, 1, 2, 4], [0, 1, 2, 3, 5, 6, 7.5]):
         with pytest.raises(ValueError, match="fields are missing"):
-            refuse_gaps(np.array(times))
+            refuse_gaps(np.array(times), times[0], times[-1])
     for times in (
         [0, 1],
         [0, 1, 2, 3],
@@ -201,4 +201,9 @@ def test_gaps_in_time():
         [0, 2, 4, 5, 6],
         [0, 5, 5.1, 10],
     ):
-        refuse_gaps(np.array(times))
+        refuse_gaps(np.array(times), times[0], times[-1])
+    times = np.array([0, 1, 3, 4, 5, 6])
+    refuse_gaps(times, 3, 6)
+    refuse_gaps(times, 0, 1)
+    with pytest.raises(ValueError, match="between the times 1 and 3"):
+        refuse_gaps(times, 2.9, 6)
