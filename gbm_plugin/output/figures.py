@@ -122,6 +122,6 @@ def replay_figure(rows: list[dict]) -> Figure:
         shown = slope <= max(row[name] for row in own for name in names)
         left.loglog(intervals[shown], slope[shown], color="0.5", linewidth=1, linestyle=line)
     left.set(xlabel="interval between fields / τ$_η$", ylabel="distance of end beads / L")
-    left.legend(fontsize=8)
+    left.legend(fontsize=8, handlelength=3.5)
     right.set(xlabel="velocity fields on disk [MB per unit time]")
     return figure
