@@ -119,9 +119,14 @@ class _Stored(Carrier):
         return self.flow.sample(positions, time, need)
 
     def on_cells(self, time: float) -> np.ndarray:
-        centres = np.moveaxis(np.indices(self.scene.cells), 0, -1) + 0.5
-        positions = self.scene.origin + centres * np.divide(self.scene.box, self.scene.cells)
-        return np.moveaxis(self.flow.sample(positions, time, "velocity")[0], -1, 0)
+        nx, ny, nz = self.scene.cells
+        plane = np.stack(np.meshgrid(0.5, np.arange(ny) + 0.5, np.arange(nz) + 0.5, indexing="ij"), axis=-1)
+        planes = (
+            plane + np.array([i, 0, 0]) for i in range(nx)
+        )  # one by one: places take as much memory as fields
+        width = np.divide(self.scene.box, self.scene.cells)
+        parts = [self.flow.sample(self.scene.origin + p * width, time, "velocity")[0] for p in planes]
+        return np.moveaxis(np.concatenate(parts), -1, 0)
 
     def save(self, folder: Path) -> None:
         path = folder / SOURCE_FILE

@@ -7,7 +7,6 @@ How often must a run write its flow for fibers that are added later?
 from __future__ import annotations
 
 import itertools
-import logging
 import math
 import shutil
 import tempfile
@@ -119,13 +118,9 @@ def _kolmogorov_time(live: Path) -> float:
 
 def _distances(live: Path, in_time: str, every: int) -> dict[str, float]:
     scene = replace(read_scene(live), write_interval=math.inf)
-    level = logging.getLogger("gbm_plugin").level
-    logging.getLogger("gbm_plugin").setLevel(logging.WARNING)  # the replays before are set aside each time
-    try:
-        if not run_stored(scene, fresh=True, in_time=in_time, every=every):
-            raise RunError(STOPPED)
-    finally:
-        logging.getLogger("gbm_plugin").setLevel(level)
+    shutil.rmtree(live / "stored", ignore_errors=True)
+    if not run_stored(scene, in_time=in_time, every=every):
+        raise RunError(STOPPED)
     result = {}
     with (
         open_recording(live / "postProcessing/fibers") as a,
