@@ -12,7 +12,7 @@ from pathlib import Path
 
 from . import __version__
 
-STUDIES = ("convergence",)  # modules of validation/, each with run, table and draw
+STUDIES = ("convergence", "replay")  # modules of validation/, each with run, table and draw
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -68,9 +68,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     sub.add_argument(
         "--flow",
-        choices=("openfoam", "spectral"),
+        choices=("openfoam", "spectral", "stored"),
         default="openfoam",
-        help="what solves the flow: OpenFOAM, or the pseudo-spectral solver, whose results go to CASE/spectral",
+        help="OpenFOAM; the pseudo-spectral solver, whose results go to CASE/spectral; or velocity fields that "
+        "are stored in the time folders or in --fields, with results in CASE/stored",
+    )
+    sub.add_argument("--fields", metavar="FILE", help="with stored: an HDF5 file of fields (docs/files.md)")
+    sub.add_argument(
+        "--in-time",
+        choices=("cubic", "linear"),
+        help="with stored: interpolation between the times of fields (default: cubic)",
     )
     sub.add_argument("--threads", type=int, default=1, help="of the spectral solver (default: 1)")
     sub.add_argument(
@@ -102,7 +109,8 @@ def _parser() -> argparse.ArgumentParser:
         "--study",
         choices=STUDIES,
         default="convergence",
-        help="convergence: errors of flow and fibers as cells and step shrink (default)",
+        help="convergence: errors of flow and fibers as cells and step shrink (default); "
+        "replay: distance of fibers in stored fields to the coupled run, by the interval between fields",
     )
     sub.add_argument("--cells", type=int, nargs="+", help="in each direction (default: as the study needs)")
     sub.add_argument("--time-step", type=float, help="of the first, in proportion for the others [s]")
@@ -153,16 +161,22 @@ def _add_json(sub: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments) -> None:
-    from .run import run, run_spectral
+    from . import run
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, until the run has its own way
-    if arguments.flow == "openfoam":
-        run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
-        return
-    if arguments.parallel:
+    if arguments.parallel and arguments.flow != "openfoam":
         raise ValueError("--parallel is for OpenFOAM; the spectral solver takes --threads")
-    options = {name: getattr(arguments, name) for name in ("fresh", "threads", "precision", "device")}
-    run_spectral(arguments.case, **options)
+    for option in ("fields", "in_time"):
+        if getattr(arguments, option) is not None and arguments.flow != "stored":
+            raise ValueError(f"--{option.replace('_', '-')} goes with --flow stored")
+    if arguments.flow == "openfoam":
+        run.run(arguments.case, parallel=arguments.parallel, fresh=arguments.fresh)
+    elif arguments.flow == "spectral":
+        options = {name: getattr(arguments, name) for name in ("fresh", "threads", "precision", "device")}
+        run.run_spectral(arguments.case, **options)
+    else:
+        in_time = arguments.in_time or "cubic"
+        run.run_stored(arguments.case, fresh=arguments.fresh, fields=arguments.fields, in_time=in_time)
 
 
 def _daemon(arguments) -> None:

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -60,11 +60,22 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
 
 def run_spectral(case: Path | str, **options) -> None:
     """Run a case in the pseudo-spectral solver; options as those of `spectral_run.run_spectral`."""
-    from . import spectral_run
+    from .spectral_run import run_spectral
 
+    _run_here(case, run_spectral, options)
+
+
+def run_stored(case: Path | str, **options) -> None:
+    """Move the fibers of a case through stored fields; options as those of `replay.run_stored`."""
+    from .replay import run_stored
+
+    _run_here(case, run_stored, options)
+
+
+def _run_here(case: Path | str, engine: Callable[..., bool], options: dict) -> None:
     case = Path(case).resolve()
     with _only_run(case):
-        if not spectral_run.run_spectral(read_scene(case), **options):
+        if not engine(read_scene(case), **options):
             raise RunError(STOPPED)
 
 

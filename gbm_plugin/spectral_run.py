@@ -6,30 +6,20 @@ Results go to the folder `spectral` in the case, which is laid out as an OpenFOA
 
 from __future__ import annotations
 
-import logging
 import math
-import os
-import signal
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from . import __version__
 from .case.dictionary import CaseError
-from .case.initial import read_initial_field, write_velocity
+from .case.initial import read_initial_field
 from .case.scene import Forcing, Scene
-from .case.times import STATE_FILE, Start, choose_start
-from .coupling.daemon import family_record
-from .coupling.fleet import Fleet
-from .coupling.steptable import StepTable
-from .output.progress import Progress
-from .output.recording import Recorder
+from .case.times import choose_start
+from .inprocess import Carrier, Run, results_folder
 from .output.restarts import keep_earlier
 from .spectral import EswaranPope, LinearForcing, SpectralSolver
 from .spectral.interpolation import WORDS
-
-log = logging.getLogger(__name__)
 
 FLOW_FILE = "uniform/flow.npz"
 COLUMNS = (
@@ -51,7 +41,7 @@ def run_spectral(
             f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of the "
             f"spectral solver's; allowed: {' '.join(WORDS)}"
         )
-    folder = _results_folder(scene.case)
+    folder = results_folder(scene.case, "spectral")
     start = choose_start(folder, scene.start_time, scene.end_time, scene.time_step, fresh)
     solver = SpectralSolver(
         cells,
@@ -64,7 +54,18 @@ def run_spectral(
         interpolation=scene.interpolation,
         device=device,
     )
-    return _Run(replace(scene, case=folder), solver, start).to_the_end()
+    if not start.continues:
+        _set_initial(scene, solver)
+    scene = replace(scene, case=folder)
+    return Run(scene, _SpectralFlow(scene, solver), start).to_the_end()
+
+
+def _set_initial(scene: Scene, solver: SpectralSolver) -> None:
+    modes = read_initial_field(scene.case)
+    try:
+        solver.set_velocity(modes.on_lattice(scene.cells, offset=0.0))
+    except ValueError as error:
+        raise CaseError(f"{scene.case}/system/initialFieldDict: {error}") from None
 
 
 def _cube(scene: Scene) -> tuple[int, float]:
@@ -90,117 +91,31 @@ def _forcing(forcing: Forcing | None) -> LinearForcing | EswaranPope | None:
     return LinearForcing(**strength) if all(strength.values()) else None
 
 
-def _results_folder(case: Path) -> Path:
-    folder = case / "spectral"
-    try:
-        folder.mkdir(exist_ok=True)
-        for part in ("constant", "system"):
-            if not (folder / part).exists():
-                os.symlink(Path("..") / part, folder / part)
-    except OSError as error:
-        raise CaseError(f"cannot write in {folder}: {error.strerror}") from None
-    return folder
+class _SpectralFlow(Carrier):
+    """The solver, and its table of energies."""
 
-
-class _Run:
-    """Flow and fibers in one process; `scene.case` is the folder of the results."""
-
-    def __init__(self, scene: Scene, solver: SpectralSolver, start: Start):
-        self.scene, self.solver, self.start = scene, solver, start
-        origin = np.asarray(scene.origin)
-        self.origin = origin
-        folders = [scene.case.parent / name for name in ("0.orig", "0")]
-        self.template = next((f / "U" for f in folders if (f / "U").is_file()), None)
-        if self.template is None:
-            raise CaseError(
-                f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written"
-            )
-        self.fleet = Fleet.seeded(scene, origin, origin + scene.box, start.time)
+    def __init__(self, scene: Scene, solver: SpectralSolver):
+        self.scene, self.solver = scene, solver
         # energy and power before the last step, and at its end
         self.before: tuple[float, float] | None = None
         self.now: tuple[float, float] | None = None
-        if start.continues:
-            self._restore()
-        else:
-            modes = read_initial_field(scene.case)
-            try:
-                solver.set_velocity(modes.on_lattice(scene.cells, offset=0.0))
-            except ValueError as error:
-                raise CaseError(f"{scene.case}/system/initialFieldDict: {error}") from None
-        self._open_outputs(_name(start.time))
 
-    def _open_outputs(self, name: str) -> None:
-        scene = self.scene
-        fibers = scene.case / "postProcessing/fibers" / name
-        self.recorder = Recorder(
-            keep_earlier(fibers / "fibers.h5"),
-            [family_record(f) for f in scene.families],
-            box_origin=scene.origin,
-            box_size=scene.box,
-            viscosity=scene.dynamic_viscosity,
-            density=scene.density,
-            dictionaries=scene.texts,
-            program_version=__version__,
-        )
-        self.table = StepTable(fibers, scene.families)
-        path = scene.case / "postProcessing/linearForcing" / name / "linearForcing.dat"
+    def sample(self, positions: np.ndarray, time: float, need: str):
+        return self.solver.sample(positions - np.asarray(self.scene.origin), self.solver.time, need)
+
+    def on_cells(self, time: float) -> np.ndarray:
+        return self.solver.shifted_velocity(0.5)
+
+    def open(self, name: str) -> None:
+        path = self.scene.case / "postProcessing/linearForcing" / name / "linearForcing.dat"
         path.parent.mkdir(parents=True, exist_ok=True)
-        self.flow_table = keep_earlier(path).open("w", buffering=1)
-        self.flow_table.write(
-            "# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n"
-        )
+        self.table = keep_earlier(path).open("w", buffering=1)
+        self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")
 
-    def to_the_end(self) -> bool:
-        stop: list[int] = []
-        handlers = {n: signal.signal(n, lambda *_: stop.append(1)) for n in (signal.SIGINT, signal.SIGTERM)}
-        scene = self.scene
-        last = round(scene.end_time / scene.time_step)
-        every = scene.write_interval / scene.time_step
-        every = round(every) if math.isfinite(every) else 0
-        self.step = round(self.start.time / scene.time_step)
-        try:
-            with Progress(scene, self.start.time) as progress:
-                self._observe()
-                self._note()
-                while self.step < last:
-                    self._advance()
-                    stopping = bool(stop) and self.step < last
-                    if stopping or self.step == last or (every and self.step % every == 0):
-                        self._save()
-                    if self.step % 10 == 0:
-                        progress.update()
-                    if stopping:
-                        return False
-        finally:
-            self.recorder.close()
-            self.table.close()
-            self.flow_table.close()
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
-        return True
-
-    def _sample(self):
-        return self.solver.sample(self.fleet.positions - self.origin, self.solver.time, self.fleet.need)
-
-    def _observe(self) -> None:
-        velocity, extra = self._sample()
-        self.fleet.observe(self.fleet.time, velocity, extra)
-        if not self.fleet.provisional:
-            self.gap = self.fleet.check_prediction(velocity, self.step)
-
-    def _advance(self) -> None:
+    def advance(self) -> None:
         self.solver.advance(1)
-        self.fleet.advance(self.scene.time_step)
-        while self.fleet.provisional:
-            self._observe()
-            self.fleet.correct()
-        self._observe()
-        self.step += 1
-        self._note()
 
-    def _note(self) -> None:
-        """The tables' rows of this time, and the record if it is due."""
-        time, fleet = self.fleet.time, self.fleet
+    def note(self, time: float) -> None:
         energy, power, dissipation = self.solver.energetics().values()
         balance = dissipation
         self.before, self.now = self.now, (energy, power)
@@ -212,23 +127,15 @@ class _Run:
         coefficient = power / (2 * energy) if energy > 0 else 0.0
         mean = self.solver.coefficients[:, 0, 0, 0].real
         row = (time, energy, balance, dissipation, dissipation, u, reynolds, eta, coefficient, power, *mean)
-        self.flow_table.write("\t".join(f"{x:.12g}" for x in row) + "\n")
-        self.table.add(time, self.step, 0.0, 0.0, self.gap, fleet.end_to_end_ratio())
-        if self.step % self.scene.record_interval == 0:
-            self.recorder.append(self.step, time, fleet.by_family)
+        self.table.write("\t".join(f"{x:.12g}" for x in row) + "\n")
 
-    def _save(self) -> None:
-        """U at the cell centres for whoever reads the folder as a case, then the states, complete with the last."""
-        folder = self.scene.case / _name(self.fleet.time)
-        write_velocity(self.template, folder / "U", self.solver.shifted_velocity(0.5))
+    def save(self, folder: Path) -> None:
         path = folder / FLOW_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("wb") as file:
             np.savez(file, before=self.before, **self.solver.state())
-        self.fleet.save(folder, self.step, self.fleet.time)
 
-    def _restore(self) -> None:
-        folder = self.scene.case / _name(self.start.time)
+    def restore(self, folder: Path) -> None:
         path = folder / FLOW_FILE
         try:
             with np.load(path) as data:
@@ -237,9 +144,6 @@ class _Run:
             raise CaseError(f"the state of the flow {path} cannot be read: {error}") from None
         self.now = tuple(state.pop("before"))  # the row of this time is made again
         self.solver.restore(state)
-        self.fleet.restore(folder)
-        log.info("flow and fibers continue from %s and %s", path, folder / STATE_FILE)
 
-
-def _name(time: float) -> str:
-    return f"{time:.8g}"
+    def close(self) -> None:
+        self.table.close()

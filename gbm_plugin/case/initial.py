@@ -74,8 +74,7 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
     (blockMesh's order), in binary; boundary conditions and dimensions are those of `template`."""
     if not np.all(np.isfinite(velocity)):
         raise CaseError("the initial velocity is not finite")
-    text = template.read_text()
-    head, tail = _around_internal_field(text, template)
+    head, tail = _around_internal_field(template.read_bytes(), template)
     cells = velocity.transpose(3, 2, 1, 0).reshape(-1, 3)
     head = _binary_header(head)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -93,13 +92,24 @@ def is_made_here(path: Path) -> bool:
         return NOTE.encode() in file.read(1000)
 
 
-def _around_internal_field(text: str, path: Path) -> tuple[str, str]:
-    match = re.search(r"^internalField[^;]*;", text, flags=re.MULTILINE)
+def _around_internal_field(content: bytes, path: Path) -> tuple[str, str]:
+    """What stands before and behind the values of a field, in ascii or binary."""
+    binary = re.search(
+        rb"^internalField\s+nonuniform\s+List<vector>\s+(\d+)\s*\(", content, flags=re.MULTILINE
+    )
+    if binary is not None and re.search(rb"\bformat\s+binary;", content[: binary.start()]):
+        rest = content[binary.end() + 24 * int(binary[1]) :]  # three doubles a cell
+        behind = re.match(rb"\)\s*;", rest)
+        if behind is None:
+            raise CaseError(f"{path}: the values of 'internalField' are not {binary[1].decode()} vectors")
+        return content[: binary.start()].decode(), rest[behind.end() :].decode()
+    match = re.search(rb"^internalField[^;]*;", content, flags=re.MULTILINE)
     if match is None:
         raise CaseError(f"{path}: the entry 'internalField' is missing")
-    return text[: match.start()], text[match.end() :]
+    return content[: match.start()].decode(), content[match.end() :].decode()
 
 
 def _binary_header(head: str) -> str:
+    head = re.sub(r'\n\s*(arch|note)\s+"[^"]*";', "", head)
     entries = f'\n    arch        "LSB;label=32;scalar=64";\n    note        "{NOTE}";'
     return re.sub(r"(\bformat\s+)\w+;", rf"\1binary;{entries}", head, count=1)

@@ -39,12 +39,12 @@ def is_complete(case: Path, name: str) -> bool:
     for folders in ([case / name], [p / name for p in case.glob("processor[0-9]*")]):
         velocity = folders and all(any((f / u).is_file() for u in ("U", "U.gz")) for f in folders)
         state = any(fiber_state(f) for f in folders)
-        if velocity and state and all(_is_whole(file) for f in folders for file in f.iterdir()):
+        if velocity and state and all(is_whole(file) for f in folders for file in f.iterdir()):
             return True
     return False
 
 
-def _is_whole(file: Path) -> bool:
+def is_whole(file: Path) -> bool:
     """False for an OpenFOAM file whose last line is missing: OpenFOAM does not notice that a disk is full."""
     if not file.is_file():
         return True

@@ -7,7 +7,8 @@ import numpy as np
 NEEDS = ("velocity", "rotation", "gradient")
 
 
-def _checked(need: str) -> str:
+def checked(need: str) -> str:
+    """The word itself; ValueError where it is none of NEEDS."""
     if need not in NEEDS:
         raise ValueError(f"need is {need!r}; allowed are {', '.join(NEEDS)}")
     return need
@@ -36,7 +37,7 @@ class LinearFlow:
         """
         positions = np.asarray(positions, dtype=float)
         velocity = positions @ self.gradient.T + self.velocity
-        if _checked(need) == "velocity":
+        if checked(need) == "velocity":
             return velocity, None
         extra = self._rotation if need == "rotation" else self.gradient
         return velocity, np.broadcast_to(extra, positions.shape[:-1] + extra.shape)
@@ -63,7 +64,7 @@ class TaylorGreen:
         velocity = np.zeros(positions.shape)
         velocity[..., 0] = self.velocity * sin_x * cos_y
         velocity[..., 1] = -self.velocity * cos_x * sin_y
-        if _checked(need) == "velocity":
+        if checked(need) == "velocity":
             return velocity, None
         rate = self.velocity * wavenumber
         if need == "rotation":

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import fluidfoam
 import numpy as np
 from fluidfoam.readof import OpenFoamFile
 from numpy.typing import NDArray
+
+_ALL_DIGITS = 30  # decimals to which fluidfoam rounds: beyond those of any velocity
 
 
 def latest_time(case: Path | str, field: str) -> str | None:
@@ -51,8 +55,14 @@ def box_mesh(case: Path | str) -> tuple[tuple[int, int, int], NDArray[np.float64
 
 
 def read_velocity(case: Path | str, time: str, cells: tuple[int, int, int]) -> NDArray[np.float64]:
-    """U of a time folder through fluidfoam, (3, nx, ny, nz) [m/s]. Raises ValueError for another count."""
-    values = fluidfoam.readvector(str(case), time, "U", verbose=False)
+    """U of a time folder through fluidfoam, (3, nx, ny, nz) [m/s], also of a decomposed case. Raises ValueError
+    for another count, or a file that is not whole."""
+    try:
+        values = fluidfoam.readvector(str(case), time, "U", precision=_ALL_DIGITS, verbose=False)
+    except (OSError, EOFError, ValueError, IndexError, KeyError, struct.error, zlib.error) as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise ValueError(f"{case}/{time}/U cannot be read, it may be cut off: {error}") from None
     values = values.reshape(3, -1)
     if values.shape[1] == 1:  # a uniform field
         values = np.broadcast_to(values, (3, int(np.prod(cells))))

@@ -101,3 +101,27 @@ def convergence_figure(rows: list[dict]) -> Figure:
     left.legend()
     right.set(xlabel="seconds of the OpenFOAM run")
     return figure
+
+
+def replay_figure(rows: list[dict]) -> Figure:
+    """Distances of `validate --study replay` against the interval between fields and against bytes on disk."""
+    figure = new_figure(8.8, 3.9)
+    left, right = figure.subplots(1, 2, sharey=True)
+    names = [name for name in rows[0] if name.endswith("_distance")]
+    for words, line, order in (("linear", "--", 2), ("cubic", "-", 4)):
+        own = [row for row in rows if row["in_time"] == words and row["every"] > 1]
+        intervals = np.array([row["interval_over_tau"] for row in own])
+        sizes = [row["bytes_per_time"] / 1e6 for row in own]
+        for number, name in enumerate(names):
+            distances = [row[name] for row in own]
+            style = dict(marker="o", markersize=4, color=COLOURS[number], linestyle=line)
+            left.loglog(intervals, distances, label=f"{name.removesuffix('_distance')}, {words}", **style)
+            right.loglog(sizes, distances, **style)
+        first = 0.5 * min(own[0][name] for name in names)
+        slope = first * (intervals / intervals[0]) ** order
+        shown = slope <= max(row[name] for row in own for name in names)
+        left.loglog(intervals[shown], slope[shown], color="0.5", linewidth=1, linestyle=line)
+    left.set(xlabel="interval between fields / τ$_η$", ylabel="distance of end beads / L")
+    left.legend(fontsize=8, handlelength=3.5)
+    right.set(xlabel="velocity fields on disk [MB per unit time]")
+    return figure

@@ -1,0 +1,142 @@
+"""Values of a periodic field on a grid of equal cells: between its nodes, and their derivatives at the nodes."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+WORDS = ("trilinear", "cubic")
+
+
+@njit(nogil=True, cache=True)
+def trilinear(fields, points, out):
+    """out (P, m) from fields (m, nx, ny, nz) at points (P, 3) in units of cells. Error O(h^2), continuous."""
+    _, nx, ny, nz = fields.shape
+    for p in range(points.shape[0]):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
+        a, b, c = x - i, y - j, z - k
+        i0, j0, k0 = i % nx, j % ny, k % nz
+        i1, j1, k1 = (i0 + 1) % nx, (j0 + 1) % ny, (k0 + 1) % nz
+        for m in range(fields.shape[0]):
+            f = fields[m]
+            near = (f[i0, j0, k0] * (1 - c) + f[i0, j0, k1] * c) * (1 - b)
+            near += (f[i0, j1, k0] * (1 - c) + f[i0, j1, k1] * c) * b
+            far = (f[i1, j0, k0] * (1 - c) + f[i1, j0, k1] * c) * (1 - b)
+            far += (f[i1, j1, k0] * (1 - c) + f[i1, j1, k1] * c) * b
+            out[p, m] = near * (1 - a) + far * a
+
+
+@njit(nogil=True, cache=True)
+def cubic(fields, points, out):
+    """As `trilinear`, with Lagrange cubics through the four nearest nodes in each direction. Error O(h^4)."""
+    weights = np.empty((3, 4))
+    nodes = np.empty((3, 4), np.intp)
+    for p in range(points.shape[0]):
+        for d in range(3):
+            x = points[p, d]
+            i = int(np.floor(x))
+            s = x - i
+            weights[d, 0] = -s * (s - 1) * (s - 2) / 6
+            weights[d, 1] = (s + 1) * (s - 1) * (s - 2) / 2
+            weights[d, 2] = -(s + 1) * s * (s - 2) / 2
+            weights[d, 3] = (s + 1) * s * (s - 1) / 6
+            for q in range(4):
+                nodes[d, q] = (i - 1 + q) % fields.shape[1 + d]
+        for m in range(fields.shape[0]):
+            total = 0.0
+            for i in range(4):
+                for j in range(4):
+                    row = fields[m, nodes[0, i], nodes[1, j]]
+                    line = 0.0
+                    for k in range(4):
+                        line += weights[2, k] * row[nodes[2, k]]
+                    total += weights[0, i] * weights[1, j] * line
+            out[p, m] = total
+
+
+def on_grid(word: str, fields: NDArray, points: NDArray) -> NDArray:
+    """Interpolate fields (m, nx, ny, nz), nodes at 0, 1, 2, ..., at points (P, 3) in units of cells, which
+    need not lie inside the box: (P, m)."""
+    out = np.empty((len(points), len(fields)))
+    {"trilinear": trilinear, "cubic": cubic}[word](fields, points, out)
+    return out
+
+
+@njit(nogil=True, cache=True)
+def _cubic_slopes(fields, points, out):
+    """out (P, m, 3): derivatives of the interpolant of `cubic` in units of cells."""
+    weights, slopes = np.empty((3, 4)), np.empty((3, 4))
+    nodes = np.empty((3, 4), np.intp)
+    for p in range(points.shape[0]):
+        for d in range(3):
+            x = points[p, d]
+            i = int(np.floor(x))
+            s = x - i
+            weights[d, 0] = -s * (s - 1) * (s - 2) / 6
+            weights[d, 1] = (s + 1) * (s - 1) * (s - 2) / 2
+            weights[d, 2] = -(s + 1) * s * (s - 2) / 2
+            weights[d, 3] = (s + 1) * s * (s - 1) / 6
+            slopes[d, 0] = -(3 * s * s - 6 * s + 2) / 6
+            slopes[d, 1] = (3 * s * s - 4 * s - 1) / 2
+            slopes[d, 2] = -(3 * s * s - 2 * s - 2) / 2
+            slopes[d, 3] = (3 * s * s - 1) / 6
+            for q in range(4):
+                nodes[d, q] = (i - 1 + q) % fields.shape[1 + d]
+        for m in range(fields.shape[0]):
+            dx = dy = dz = 0.0
+            for i in range(4):
+                for j in range(4):
+                    row = fields[m, nodes[0, i], nodes[1, j]]
+                    line = slope = 0.0
+                    for k in range(4):
+                        value = row[nodes[2, k]]
+                        line += weights[2, k] * value
+                        slope += slopes[2, k] * value
+                    dx += slopes[0, i] * weights[1, j] * line
+                    dy += weights[0, i] * slopes[1, j] * line
+                    dz += weights[0, i] * weights[1, j] * slope
+            out[p, m, 0], out[p, m, 1], out[p, m, 2] = dx, dy, dz
+
+
+def cubic_gradient(velocity: NDArray, points: NDArray, spacing: NDArray) -> NDArray:
+    """du_i/dx_j (P, 3, 3) of the `cubic` interpolant of a velocity (3, nx, ny, nz), points as in `on_grid`. Error
+    O(h^3)."""
+    out = np.empty((len(points), 3, 3))
+    _cubic_slopes(velocity, points, out)
+    return out / spacing
+
+
+@njit(nogil=True, cache=True)
+def _add_difference(f, factor, out):
+    """out += factor (f[i+1] - f[i-1]) in the middle one of three periodic directions."""
+    before, n, after = f.shape
+    for b in range(before):
+        for i in range(n):
+            for a in range(after):
+                out[b, i, a] += factor * (f[b, (i + 1) % n, a] - f[b, (i - 1) % n, a])
+
+
+def add_derivative(f: NDArray, axis: int, spacing: float, factor: float, out: NDArray) -> None:
+    """out += factor df/dx_axis at the nodes, f and out (nx, ny, nz), contiguous, by central differences (as
+    OpenFOAM's `Gauss linear`)."""
+    shape = (int(np.prod(f.shape[:axis])), f.shape[axis], int(np.prod(f.shape[axis + 1 :])))
+    _add_difference(f.reshape(shape), factor / (2 * spacing), out.reshape(shape))
+
+
+def rotation(velocity: NDArray, spacing: NDArray) -> NDArray:
+    """½∇×u (3, nx, ny, nz) at the nodes of a velocity (3, nx, ny, nz), by central differences."""
+    out = np.zeros(velocity.shape)
+    for c in range(3):
+        d, e = (c + 1) % 3, (c + 2) % 3
+        add_derivative(velocity[e], d, spacing[d], 0.5, out[c])
+        add_derivative(velocity[d], e, spacing[e], -0.5, out[c])
+    return out
+
+
+def gradient(velocity: NDArray, spacing: NDArray) -> NDArray:
+    """du_i/dx_j (9, nx, ny, nz), j fastest, at the nodes of a velocity (3, nx, ny, nz), by central differences."""
+    out = np.zeros((3, 3, *velocity.shape[1:]))
+    for i in range(3):
+        for j in range(3):
+            add_derivative(velocity[i], j, spacing[j], 1.0, out[i, j])
+    return out.reshape(9, *velocity.shape[1:])

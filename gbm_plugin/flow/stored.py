@@ -1,0 +1,178 @@
+"""A flow that was stored as velocity fields on a periodic grid, interpolated in time and space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import grid
+from .analytic import checked
+
+POINTS_IN_TIME = {"linear": 2, "cubic": 4}
+LOCATIONS = {"nodes": 0.0, "centres": 0.5}  # where the values sit, in cells from a cell's corner
+SAME_TIME = (
+    1e-6  # times closer than this part of the interval between fields are one: names of folders are rounded
+)
+GAP = 1.5  # an interval so much longer than both beside it, and than the usual one, lacks a field
+
+
+class StoredFlow:
+    """Velocity fields at given times, read as they are needed; in memory are only those around the latest time.
+
+    times (T,) [s], increasing, at least two; read(i): the velocity (3, nx, ny, nz) [m/s] at times[i], whose value
+    [:, i, j, k] sits at origin + ((i, j, k) + offset) box/(nx, ny, nz): offset 0 for nodes, ½ for cell centres.
+    box, origin (3,) [m].
+
+    in_time: "cubic" (through four fields, from one side near the ends; through all where there are fewer) or
+    "linear". At a stored time the field itself is taken. interpolation in space: "trilinear", with derivatives
+    by central differences at the nodes, interpolated alike; or "cubic", with the interpolant's own derivatives;
+    both as the coupling to OpenFOAM has them. ValueError for an unknown word or bad numbers.
+    """
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        read: Callable[[int], NDArray],
+        box: ArrayLike,
+        origin: ArrayLike = (0, 0, 0),
+        offset: float = 0.5,
+        interpolation: str = "trilinear",
+        in_time: str = "cubic",
+    ):
+        self.times = np.array(times, dtype=float)
+        self.box, self.origin = (np.array(v, dtype=float) for v in (box, origin))
+        self.offset = float(offset)
+        self.interpolation = _one_of("interpolation", interpolation, grid.WORDS)
+        self.in_time = _one_of("interpolation in time", in_time, POINTS_IN_TIME)
+        self._read = read
+        self._fields: dict[int, dict[str, NDArray]] = {}
+        self._shape: tuple[int, ...] | None = None
+        if self.times.ndim != 1 or len(self.times) < 2:
+            raise ValueError(
+                f"fields at {self.times.size} times are stored; at least 2 are needed to interpolate"
+            )
+        if not np.isfinite(self.times).all():
+            raise ValueError("the stored times are not all finite")
+        wrong = np.flatnonzero(np.diff(self.times) <= 0)
+        if len(wrong):
+            before, after = self.times[wrong[0] : wrong[0] + 2]
+            raise ValueError(f"the stored times must increase, but {before:.9g} is followed by {after:.9g}")
+        if self.box.shape != (3,) or self.origin.shape != (3,):
+            raise ValueError(
+                f"box and origin have shapes {self.box.shape} and {self.origin.shape}; they must be (3,)"
+            )
+        if not (np.isfinite(self.box).all() and (self.box > 0).all() and np.isfinite(self.origin).all()):
+            raise ValueError(
+                f"box is {self.box} and origin {self.origin}; widths must be positive, all finite"
+            )
+
+    def sample(
+        self, positions: ArrayLike, time: float, need: str = "gradient"
+    ) -> tuple[NDArray, NDArray | None]:
+        """Velocity (..., 3) at positions (..., 3), which may lie outside of the box, and what need asks for.
+
+        need: "velocity" (extra is None), "rotation" (½∇×u, (..., 3)) or "gradient" ((..., 3, 3), [..., i, j] =
+        du_i/dx_j). ValueError for a time that is not in the stored range or a field of another shape,
+        FloatingPointError for a field or position that is not finite.
+        """
+        checked(need)
+        positions = np.asarray(positions, dtype=float)
+        if positions.shape[-1:] != (3,):
+            raise ValueError(f"positions have shape {positions.shape}; (..., 3) is needed")
+        if not np.isfinite(positions).all():
+            raise FloatingPointError(f"a position at time {time:g} is not finite")
+        numbers, weights = self._stencil(time)
+        fields = [self._field(n, "velocity") for n in numbers]
+        points = (positions.reshape(-1, 3) - self.origin) * (self._shape[1:] / self.box) - self.offset
+        parts = (grid.on_grid(self.interpolation, field, points) for field in fields)
+        velocity = sum(w * part for w, part in zip(weights, parts, strict=True)).reshape(positions.shape)
+        if need == "velocity":
+            return velocity, None
+        parts = (self._derivative(n, need, points) for n in numbers)
+        extra = sum(w * part for w, part in zip(weights, parts, strict=True))
+        tail = (3, 3) if need == "gradient" else (3,)
+        return velocity, extra.reshape(*positions.shape[:-1], *tail)
+
+    def _derivative(self, number: int, need: str, points: NDArray) -> NDArray:
+        """Rotation (P, 3) or gradient (P, 9 or 3, 3) of one stored field at points in units of cells."""
+        if self.interpolation == "trilinear":
+            return grid.on_grid("trilinear", self._field(number, need), points)
+        g = grid.cubic_gradient(self._field(number, "velocity"), points, self.box / self._shape[1:])
+        if need == "gradient":
+            return g
+        curl = (g[:, 2, 1] - g[:, 1, 2], g[:, 0, 2] - g[:, 2, 0], g[:, 1, 0] - g[:, 0, 1])
+        return 0.5 * np.stack(curl, axis=-1)
+
+    def _stencil(self, time: float) -> tuple[list[int], list[float]]:
+        """Which fields make that of a time, and their weights. Forgets the fields that are far from it."""
+        times = self.times
+        near = int(np.argmin(np.abs(times - time)))
+        slack = SAME_TIME * np.diff(times[max(0, near - 1) : near + 2]).min()
+        at_field = abs(times[near] - time) <= slack
+        if not at_field and not times[0] <= time <= times[-1]:
+            raise ValueError(
+                f"time {time:.9g} is not within the stored fields, from {times[0]:.9g} to {times[-1]:.9g}"
+            )
+        count = min(POINTS_IN_TIME[self.in_time], len(times))
+        before = near if at_field else int(np.searchsorted(times, time)) - 1
+        first = int(np.clip(before - (count - 1) // 2, 0, len(times) - count))
+        window = range(first, first + count)
+        self._fields = {n: fields for n, fields in self._fields.items() if n in window}
+        if at_field:
+            return [near], [1.0]
+        others = [[times[m] for m in window if m != n] for n in window]
+        weights = [
+            float(np.prod([(time - t) / (times[n] - t) for t in rest]))
+            for n, rest in zip(window, others, strict=True)
+        ]
+        return list(window), weights
+
+    def _field(self, number: int, name: str) -> NDArray:
+        """velocity, rotation or gradient at one of the stored times, components first."""
+        kept = self._fields.setdefault(number, {})
+        if "velocity" not in kept:
+            kept["velocity"] = self._velocity(number)
+        if name not in kept:
+            spacing = self.box / self._shape[1:]
+            kept[name] = getattr(grid, name)(kept["velocity"], spacing)
+        return kept[name]
+
+    def _velocity(self, number: int) -> NDArray:
+        velocity = np.ascontiguousarray(self._read(number), dtype=float)
+        shape, time = velocity.shape, self.times[number]
+        if self._shape is None and len(shape) == 4 and shape[0] == 3 and min(shape) > 0:
+            self._shape = shape
+        if shape != self._shape:
+            needed = self._shape or "(3, nx, ny, nz)"
+            raise ValueError(f"the velocity stored at time {time:.9g} has shape {shape}; {needed} is needed")
+        if not np.isfinite(velocity.sum()) and not np.isfinite(velocity).all():
+            component, *cell = np.argwhere(~np.isfinite(velocity))[0].tolist()
+            raise FloatingPointError(
+                f"the velocity stored at time {time:.9g} is not finite: component {component} in cell {tuple(cell)}"
+            )
+        return velocity
+
+
+def refuse_gaps(times: NDArray, begin: float, end: float) -> None:
+    """ValueError where a field between begin and end seems to be missing: an interval between two times that is
+    longer than those beside it and than most. Times that are written more or less often from some time on are none.
+    """
+    intervals = np.diff(times)
+    usual = np.median(intervals)
+    for n, interval in enumerate(intervals):
+        if times[n + 1] < begin + SAME_TIME * interval or times[n] > end - SAME_TIME * interval:
+            continue
+        beside = [intervals[m] for m in (n - 1, n + 1) if 0 <= m < len(intervals)]
+        if beside and interval > GAP * max(usual, *beside):
+            raise ValueError(
+                f"between the times {times[n]:.9g} and {times[n + 1]:.9g} no field is stored, others are "
+                f"{usual:.3g} apart: fields are missing; startTime and endTime can choose a part without the gap"
+            )
+
+
+def _one_of(name: str, word: str, allowed) -> str:
+    if word not in allowed:
+        raise ValueError(f"{name} is '{word}'; stored fields allow: {' '.join(allowed)}")
+    return word
