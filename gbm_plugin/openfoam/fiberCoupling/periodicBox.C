@@ -49,6 +49,12 @@ Foam::point Foam::periodicBox::wrap(const point& p) const
 
     for (direction d = 0; d < vector::nComponents; ++d)
     {
+        if (min()[d] <= p[d] && p[d] < max()[d])
+        {
+            q[d] = p[d];
+            continue;
+        }
+
         const scalar x = (p[d] - min()[d])/L[d];
         const scalar y = min()[d] + L[d]*(x - std::floor(x));
 

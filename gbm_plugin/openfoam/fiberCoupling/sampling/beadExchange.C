@@ -14,13 +14,19 @@ Foam::beadExchange::beadExchange(const periodicBox& box, const locator& places)
 
 // * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
 
+template<class PointList>
 void Foam::beadExchange::take
 (
     const labelUList& numbers,
-    const UList<point>& points
+    const PointList& points
 )
 {
-    forAll(points, i)
+    const label capacity = numbers_.size() + numbers.size();
+    numbers_.reserve(capacity);
+    points_.reserve(capacity);
+    cells_.reserve(capacity);
+
+    forAll(numbers, i)
     {
         const label celli = places_.findCell(points[i]);
 
@@ -78,7 +84,7 @@ void Foam::beadExchange::locate(const UList<point>& positions)
             take
             (
                 candidates[me],
-                List<point>(UIndirectList<point>(wrapped, candidates[me]))
+                UIndirectList<point>(wrapped, candidates[me])
             );
         }
         else if (received[rank])

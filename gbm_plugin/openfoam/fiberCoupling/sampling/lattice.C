@@ -42,6 +42,7 @@ bool Foam::lattice::measure()
     {
         n_[d] = label(std::round(box_.span()[d]/h[d]));
         h_[d] = box_.span()[d]/n_[d];
+        perCell_[d] = 1/h_[d];
     }
 
     const double all = double(n_.x())*double(n_.y())*double(n_.z());
@@ -71,7 +72,7 @@ Foam::Vector<Foam::label> Foam::lattice::place(const point& p) const
 
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        i[d] = label(std::floor((p[d] - box_.min()[d])/h_[d]));
+        i[d] = label((p[d] - box_.min()[d])*perCell_[d]);
         i[d] = max(label(0), min(n_[d] - 1, i[d]));
     }
 
@@ -181,6 +182,7 @@ Foam::List<Foam::DynamicList<Foam::label>> Foam::lattice::candidates
 ) const
 {
     List<DynamicList<label>> result(Pstream::nProcs());
+    result[Pstream::myProcNo()].reserve(points.size());
 
     forAll(points, p)
     {
@@ -230,8 +232,9 @@ const Foam::label* Foam::lattice::around
 
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        const scalar x = (p[d] - box_.min()[d])/h_[d] - 0.5;
-        lower[d] = label(std::floor(x));
+        // the box's lower corner is at 0, so that x + 1 is positive
+        const scalar x = (p[d] - box_.min()[d])*perCell_[d] - 0.5;
+        lower[d] = label(x + 1) - 1;
         weights[d] = x - lower[d];
     }
 

@@ -12,7 +12,7 @@ Foam::scalarList Foam::latticeSampler<Interpolant>::sample
 {
     const vectorField& cells = U.primitiveField();
     const List<vector> neighbours(lattice_->gather(cells));
-    const vector perCell(cmptDivide(vector::one, lattice_->cellSize()));
+    const vector& perCell = lattice_->perCell();
 
     stencil u
     {
