@@ -60,11 +60,12 @@ def make(
     cells: int,
     steps: int,
     seed: int = 1,
-    entries: Mapping[str, Mapping[str, object]] | None = None,
+    changes: Mapping[str, Mapping[str, object] | str] | None = None,
 ) -> None:
     """A copy of `case` with its schemes and solvers but the studies' flow and fibers.
 
-    cells: in each direction. steps: to END_TIME. entries: {dictionary: {entry: value}}, changed on top.
+    cells: in each direction. steps: to END_TIME.
+    changes, on top: {dictionary: {entry: value}} in place, {dictionary: text} as a whole.
     """
     every = {
         "system/controlDict": {
@@ -80,7 +81,9 @@ def make(
         "system/initialFieldDict": FLOW.format(seed=seed),
         "constant/fvOptions": FORCING,
     }
-    copy_case(case, copy, {**every, **(entries or {})}, texts)
+    for name, change in (changes or {}).items():
+        (texts if isinstance(change, str) else every)[name] = change
+    copy_case(case, copy, every, texts)
 
 
 def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str | None = None) -> State:
