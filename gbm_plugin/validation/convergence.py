@@ -20,7 +20,7 @@ from .comparison import END_TIME, VISCOSITY
 
 
 def run(
-    case: Path | str, cells: Sequence[int] = (24, 32, 48, 64), time_step: float = 0.04, seed: int = 1
+    case: Path | str, cells: Sequence[int] = (24, 32, 48, 64), time_step: float = 0.08, seed: int = 1
 ) -> dict:
     """Errors of OpenFOAM against the spectral solver at the same time.
 

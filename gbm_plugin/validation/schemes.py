@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from ..output.style import COLOURS, new_figure
 from . import comparison
@@ -113,6 +114,9 @@ def run(
         comparison.check_cells(n)
     if not 0 < time_step <= END_TIME / 4:
         raise ValueError(f"time step is {time_step:g}; allowed: positive, up to {END_TIME / 4:g}")
+    for name in settings:
+        if name not in SETTINGS:
+            raise ValueError(f"there is no setting '{name}'; allowed: {'; '.join(SETTINGS)}")
     rows = []
     for n in cells:
         fewest = round(END_TIME / (time_step * cells[0] / n))
@@ -219,26 +223,24 @@ def table(result: dict) -> str:
 
 
 def draw(result: dict) -> Figure:
-    """Error of flow and fibers against processor time, the best ten settings named."""
-    figure = new_figure(10.5, 4.6)
+    """Error of flow and fibers against processor time; the case and the best five settings are named."""
     rows = result["rows"]
-    best = dict.fromkeys(r["setting"] for r in sorted(rows, key=lambda r: r["velocity_at_equal_cost"]))
-    named = [*list(best)[:9], "the case"]
+    ranked = [r["setting"] for r in sorted(rows, key=lambda r: r["velocity_at_equal_cost"])]
+    named = list(dict.fromkeys(["the case", *ranked]))[:6]
+    figure = new_figure(9.5, 5.6)
     for axes, name in zip(figure.subplots(1, 2), ("velocity", "fiber"), strict=True):
-        for setting in dict.fromkeys(r["setting"] for r in rows):
-            ours = [r for r in rows if r["setting"] == setting]
-            number = named.index(setting) if setting in named else None
-            style = {"color": "0.75"} if number is None else {"color": COLOURS[number % len(COLOURS)]}
-            label = setting if number is not None else None
-            marker = "os^vD"[(number or 0) // len(COLOURS) % 5]
-            axes.loglog(
-                [r["processor_seconds"] for r in ours],
-                [r[f"{name}_error"] for r in ours],
-                marker=marker,
-                linewidth=1,
-                label=label,
-                **style,
-            )
-        axes.set(xlabel="processor time of the solver [s]", ylabel=f"error of the {name}")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper", fontsize=8)
+        for cells, setting in dict.fromkeys((r["cells"], r["setting"]) for r in rows):
+            ours = [r for r in rows if (r["cells"], r["setting"]) == (cells, setting)]
+            known = setting in named
+            colour = COLOURS[named.index(setting)] if known else "0.75"
+            x, y = ([r[key] for r in ours] for key in ("processor_seconds", f"{name}_error"))
+            axes.plot(x, y, "o-", color=colour, linewidth=1, zorder=3 if known else 2, label=setting)
+        axes.set(xscale="log", yscale="log", xlabel="processor time of the solver [s]")
+        axes.set_ylabel("error of the velocity" if name == "velocity" else "error of the fibers")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    figure.legend([handles[n] for n in named], named, loc="outside lower center", ncols=2, fontsize=9)
     return figure
