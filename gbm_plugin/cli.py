@@ -12,7 +12,11 @@ from pathlib import Path
 
 from . import __version__
 
-STUDIES = ("convergence", "replay")  # modules of validation/, each with run, table and draw
+STUDIES = {  # modules of validation/, each with run, table and draw
+    "convergence": "errors of flow and fibers as cells and step shrink (default)",
+    "schemes": "which of OpenFOAM's schemes have the least error for their time",
+    "replay": "distance of fibers in stored fields to the coupled run, by the interval between fields",
+}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -109,8 +113,7 @@ def _parser() -> argparse.ArgumentParser:
         "--study",
         choices=STUDIES,
         default="convergence",
-        help="convergence: errors of flow and fibers as cells and step shrink (default); "
-        "replay: distance of fibers in stored fields to the coupled run, by the interval between fields",
+        help="; ".join(f"{name}: {text}" for name, text in STUDIES.items()),
     )
     sub.add_argument("--cells", type=int, nargs="+", help="in each direction (default: as the study needs)")
     sub.add_argument("--time-step", type=float, help="of the first, in proportion for the others [s]")

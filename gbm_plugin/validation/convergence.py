@@ -14,34 +14,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..case.copies import HEADER, copy_case
-from ..output.field import read_velocity
 from ..output.figures import convergence_figure
-from ..output.recording import open_recording
-from ..run import run as run_openfoam
-from ..run import run_spectral
-
-FLOW = """field random; spectrum table; table ((1 0.08) (2 0.12) (3 0.05)); seed {seed};
-"""
-FORCING = """linearForcing { type linearForcing; mode constantPower; power 0.05; }
-"""
-FIBERS = """recordInterval {steps};
-integrator auto;
-tolerance 1e-6;
-interpolation {interpolation};
-families
-{{
-    stiff {{ count 50; beads 20; length 1.5; bendingStiffness 1e-2; seed 1; }}
-    medium {{ count 50; beads 20; length 1.5; bendingStiffness 1e-3; seed 2; }}
-    soft {{ count 50; beads 20; length 1.5; bendingStiffness 1e-4; seed 3; }}
-}}
-"""
-END_TIME = 1.2  # half a turnover: k/eps of this flow, at its start, is 2.5 s
-VISCOSITY = 0.03  # Kolmogorov length 0.15: 24 cells are 1.8 of it wide
+from . import comparison
+from .comparison import END_TIME, VISCOSITY
 
 
 def run(
-    case: Path | str, cells: Sequence[int] = (24, 32, 48, 64), time_step: float = 0.04, seed: int = 1
+    case: Path | str, cells: Sequence[int] = (24, 32, 48, 64), time_step: float = 0.08, seed: int = 1
 ) -> dict:
     """Errors of OpenFOAM against the spectral solver at the same time.
 
@@ -49,8 +28,10 @@ def run(
     take it in proportion to their cells. Velocity: rms difference at the cell centres over the rms velocity.
     Fibers: rms difference of the end beads over the fiber length, for each family. Raises as `gbm_plugin.run.run`.
     """
-    if len(set(cells)) < len(cells) or any(n < 8 or n % 2 for n in cells):
-        raise ValueError(f"cells are {cells}; allowed: even numbers of at least 8, each once")
+    for n in cells:
+        comparison.check_cells(n)
+    if len(set(cells)) < len(cells):
+        raise ValueError(f"cells are {cells}; allowed: each number once")
     if not 0 < time_step <= END_TIME / 4:
         raise ValueError(f"time step is {time_step:g}; allowed: positive, up to {END_TIME / 4:g}")
     rows = []
@@ -62,58 +43,22 @@ def run(
 
 
 def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
-    _make(case, copy, n, steps, seed)
-    seconds = {}
-    for engine, function in (("openfoam", run_openfoam), ("spectral", run_spectral)):
-        words = FIBERS.format(steps=steps, interpolation="trilinear" if engine == "openfoam" else "exact")
-        (copy / "constant/fiberProperties").write_text(HEADER + words)
+    comparison.make(case, copy, n, steps, seed)
+    seconds, states = {}, {}
+    for engine in ("openfoam", "spectral"):
         start = time.perf_counter()
-        function(copy)
+        states[engine] = comparison.run(copy, n, steps, engine)
         seconds[engine] = time.perf_counter() - start
-    name = f"{END_TIME:g}"
-    ours = read_velocity(copy, name, (n, n, n))
-    reference = read_velocity(copy / "spectral", name, (n, n, n))
+    ours, reference = states["openfoam"], states["spectral"]
     result = {
         "cells": n,
         "time_step": END_TIME / steps,
-        "velocity_error": _rms(ours - reference) / _rms(reference),
+        "velocity_error": comparison.velocity_distance(ours, reference),
         "openfoam_seconds": seconds["openfoam"],
         "spectral_seconds": seconds["spectral"],
     }
-    with (
-        open_recording(copy / "postProcessing/fibers") as a,
-        open_recording(copy / "spectral/postProcessing/fibers") as b,
-    ):
-        for family in a.families:
-            x, y = a.families[family].positions[-1], b.families[family].positions[-1]
-            length = 2 * a.families[family].radius * a.families[family].beads
-            ends = (x - y)[:, [0, -1]]
-            result[f"{family}_error"] = float(np.sqrt(np.mean(np.sum(ends**2, axis=-1)))) / length
-    return result
-
-
-def _make(case: Path, copy: Path, n: int, steps: int, seed: int) -> None:
-    time = {
-        "deltaT": END_TIME / steps,
-        "endTime": END_TIME,
-        "writeControl": "timeStep",
-        "writeInterval": steps,
-    }
-    entries = {
-        "system/controlDict": time,
-        "system/blockMeshDict": {"n": n},
-        "constant/transportProperties": {"nu": VISCOSITY},
-    }
-    texts = {
-        "system/initialFieldDict": FLOW.format(seed=seed),
-        "constant/fvOptions": FORCING,
-        "constant/fiberProperties": FIBERS.format(steps=steps, interpolation="trilinear"),
-    }
-    copy_case(case, copy, entries, texts)
-
-
-def _rms(u: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.sum(u**2, axis=0))))
+    fibers = comparison.fiber_distance(ours, reference)
+    return result | {f"{family}_error": error for family, error in fibers.items()}
 
 
 def _orders(rows: list[dict]) -> list[dict]:

@@ -201,9 +201,10 @@ def test_finished_run_begins_afresh_and_is_extended(tmp_path, whole):
 
 
 def test_time_step_changed_at_a_restart(tmp_path, whole):
-    """Halved after 0.2: nearer to a run with the half step throughout than the whole step is."""
+    """Halved after 0.2: nearer to a run with the half step throughout than the whole step is. With Euler: OpenFOAM
+    takes the step before a restart for as long as the new one, of which `backward` makes an error of its own."""
     case = tmp_path / "case"
-    shutil.copytree(whole(), case)
+    shutil.copytree(whole("Euler"), case)
     for time in ("0.3", "0.4"):
         shutil.rmtree(case / time)
     control = case / "system/controlDict"
@@ -215,10 +216,11 @@ def test_time_step_changed_at_a_restart(tmp_path, whole):
         np.testing.assert_allclose(np.diff(recording.times), [0.02] * 10 + [0.01] * 20, atol=1e-12)
         mixed = recording.families["test"].positions[-1]
     fine = make_case(tmp_path / "fine", steps=40, time_step=0.01, write_every=40)
+    use_scheme(fine, "Euler")
     run_case(fine)
     with open_recording(fine / "postProcessing/fibers") as recording:
         reference = recording.families["test"].positions[-1]
-    with open_recording(whole() / "postProcessing/fibers") as recording:
+    with open_recording(whole("Euler") / "postProcessing/fibers") as recording:
         coarse = recording.families["test"].positions[-1]
     assert 0 < np.abs(mixed - reference).max() < np.abs(coarse - reference).max()
 

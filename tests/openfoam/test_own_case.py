@@ -17,6 +17,15 @@ from conftest import DEFAULT_CASE, FAMILY, HEADER, gbm, start_solver
 README = Path(__file__).parents[2] / "README.md"
 
 
+STOCK_SCHEMES = """ddtSchemes { default Euler; }
+gradSchemes { default Gauss linear; }
+divSchemes { default Gauss linear; }
+laplacianSchemes { default Gauss linear corrected; }
+interpolationSchemes { default linear; }
+snGradSchemes { default corrected; }
+"""
+
+
 def foreign_case(path: Path, application: str) -> Path:
     """A periodic box with a vortex, as somebody might have it: other names, PISO, no forcing, times from 2."""
     shutil.copytree(
@@ -24,6 +33,8 @@ def foreign_case(path: Path, application: str) -> Path:
     )
     for unwanted in ("constant/fiberProperties", "constant/fvOptions", "system/initialFieldDict"):
         (path / unwanted).unlink()
+    (path / "constant/turbulenceProperties").write_text(HEADER + "simulationType laminar;\n")
+    (path / "system/fvSchemes").write_text(HEADER + STOCK_SCHEMES)
     (path / "0.orig").rename(path / "2")
     mesh = path / "system/blockMeshDict"
     mesh.write_text(re.sub(r"n +32;", "n 12;", mesh.read_text()))

@@ -14,7 +14,8 @@ Foam::scalar Foam::kinematicViscosity(const objectRegistry& mesh)
     {
         FatalIOErrorInFunction(transport)
             << "transportModel '" << model
-            << "': fibers and statistics need a Newtonian fluid"
+            << "': fibers, statistics and constantViscosity need a fluid of"
+            << " constant viscosity, Newtonian"
             << exit(FatalIOError);
     }
 

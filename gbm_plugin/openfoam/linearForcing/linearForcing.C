@@ -260,16 +260,17 @@ void Foam::fv::linearForcing::addSup(fvMatrix<vector>& eqn, const label)
         beginStep(U);
     }
 
-    const dimensionedScalar A("A", dimless/dimTime, A_);
-    const dimensionedVector mean
-    (
-        "mean",
-        dimVelocity,
-        flowStatistics::average(U)
-    );
+    // A U implicit and -A mean explicit, without a matrix of their own
+    const vector mean(flowStatistics::average(U));
+    const scalarField& V = mesh_.V();
+    scalarField& diag = eqn.diag();
+    vectorField& source = eqn.source();
 
-    eqn += fvm::Sp(A, U);
-    eqn -= A*mean;
+    forAll(V, celli)
+    {
+        diag[celli] += A_*V[celli];
+        source[celli] += A_*V[celli]*mean;
+    }
 }
 
 
@@ -286,28 +287,44 @@ void Foam::fv::linearForcing::addSup
 }
 
 
+void Foam::fv::linearForcing::removeMean
+(
+    volVectorField& U,
+    const vector& mean
+) const
+{
+    U -= dimensionedVector("mean", dimVelocity, mean);
+
+    surfaceScalarField* phi =
+        mesh_.getObjectPtr<surfaceScalarField>(phiName_);
+    if (!phi)
+    {
+        return;
+    }
+
+    // kept before it changes: in the first step nobody has asked for it
+    phi->oldTime();
+
+    const surfaceVectorField& Sf = mesh_.Sf();
+    scalarField& flux = phi->primitiveFieldRef();
+    forAll(flux, facei)
+    {
+        flux[facei] -= mean & Sf[facei];
+    }
+    for (fvsPatchScalarField& fluxp : phi->boundaryFieldRef())
+    {
+        fluxp -= mean & Sf.boundaryField()[fluxp.patch().index()];
+    }
+}
+
+
 void Foam::fv::linearForcing::correct(volVectorField& U)
 {
-    const dimensionedVector mean
-    (
-        "mean",
-        dimVelocity,
-        flowStatistics::average(U)
-    );
+    const vector mean(flowStatistics::average(U));
 
-    // a mean below rounding costs nothing and does no harm
-    if (mag(mean.value()) > SMALL*Foam::sqrt(kOld_))
+    if (mag(mean) > meanTolerance*Foam::sqrt(kOld_))
     {
-        U -= mean;
-
-        surfaceScalarField* phi =
-            mesh_.getObjectPtr<surfaceScalarField>(phiName_);
-        if (phi)
-        {
-            // kept before it changes: in the first step nobody has asked for it
-            phi->oldTime();
-            *phi -= (mean & mesh_.Sf());
-        }
+        removeMean(U, mean);
     }
 
     if (mesh_.time().writeTime())
