@@ -77,27 +77,3 @@ def end_to_end_figure(times: NDArray, families: Mapping[str, tuple[NDArray, NDAr
     axes.set(xlabel="t [s]", ylabel="⟨R²⟩ / L²,  L = 2a(N−1)", ylim=(0, 1.05))
     axes.legend(loc="lower left")
     return figure
-
-
-def convergence_figure(rows: list[dict]) -> Figure:
-    """Errors of `validate` against the number of cells per edge, with second order, and against time spent."""
-    figure = new_figure(8.8, 3.9)
-    left, right = figure.subplots(1, 2, sharey=True)
-    cells = np.array([row["cells"] for row in rows])
-    seconds = [row["openfoam_seconds"] for row in rows]
-    names = [name for name in rows[0] if name.endswith("_error")]
-    for number, name in enumerate(names):
-        errors = [row[name] for row in rows]
-        style = dict(marker="o", markersize=4, color=COLOURS[number], linestyle=LINES[number % len(LINES)])
-        left.loglog(cells, errors, label=name.removesuffix("_error"), **style)
-        right.loglog(seconds, errors, **style)
-    largest = max(rows[0][name] for name in names)
-    left.loglog(
-        cells, 1.3 * largest * (cells[0] / cells) ** 2, color="0.5", linewidth=1, label="second order"
-    )
-    left.set(xlabel="cells per edge", ylabel="error against the spectral solver")
-    left.set_xticks(cells, [str(n) for n in cells])
-    left.minorticks_off()
-    left.legend()
-    right.set(xlabel="seconds of the OpenFOAM run")
-    return figure

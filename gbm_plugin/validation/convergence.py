@@ -5,21 +5,20 @@ How fast OpenFOAM and its fibers converge to the spectral solver, which resolves
 
 from __future__ import annotations
 
-import itertools
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from ..case.copies import HEADER, copy_case
+from ..case.copies import HEADER
 from ..output.field import read_velocity
-from ..output.figures import convergence_figure
 from ..output.recording import open_recording
+from ..output.study_figures import convergence_figure
 from ..run import run as run_openfoam
 from ..run import run_spectral
+from .runs import checked_cells, checked_step, ends_apart, observed_orders, order_lines, rms, scene_copy
 
 FLOW = """field random; spectrum table; table ((1 0.08) (2 0.12) (3 0.05)); seed {seed};
 """
@@ -49,20 +48,27 @@ def run(
     take it in proportion to their cells. Velocity: rms difference at the cell centres over the rms velocity.
     Fibers: rms difference of the end beads over the fiber length, for each family. Raises as `gbm_plugin.run.run`.
     """
-    if len(set(cells)) < len(cells) or any(n < 8 or n % 2 for n in cells):
-        raise ValueError(f"cells are {cells}; allowed: even numbers of at least 8, each once")
-    if not 0 < time_step <= END_TIME / 4:
-        raise ValueError(f"time step is {time_step:g}; allowed: positive, up to {END_TIME / 4:g}")
+    checked_cells(cells)
+    checked_step(time_step, END_TIME / 4)
     rows = []
     with tempfile.TemporaryDirectory(prefix="gbm-validate-") as folder:
         for n in cells:
             steps = round(END_TIME / (time_step * cells[0] / n))
             rows.append(_compare(Path(case), Path(folder) / str(n), n, steps, seed))
-    return {"end_time": END_TIME, "viscosity": VISCOSITY, "rows": rows, "orders": _orders(rows)}
+    return {"end_time": END_TIME, "viscosity": VISCOSITY, "rows": rows, "orders": observed_orders(rows)}
 
 
 def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
-    _make(case, copy, n, steps, seed)
+    scene_copy(
+        case,
+        copy,
+        cells=n,
+        steps=steps,
+        end_time=END_TIME,
+        viscosity=VISCOSITY,
+        write_every=steps,
+        texts={"system/initialFieldDict": FLOW.format(seed=seed), "constant/fvOptions": FORCING},
+    )
     seconds = {}
     for engine, function in (("openfoam", run_openfoam), ("spectral", run_spectral)):
         words = FIBERS.format(steps=steps, interpolation="trilinear" if engine == "openfoam" else "exact")
@@ -76,7 +82,7 @@ def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
     result = {
         "cells": n,
         "time_step": END_TIME / steps,
-        "velocity_error": _rms(ours - reference) / _rms(reference),
+        "velocity_error": rms(ours - reference) / rms(reference),
         "openfoam_seconds": seconds["openfoam"],
         "spectral_seconds": seconds["spectral"],
     }
@@ -84,59 +90,15 @@ def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
         open_recording(copy / "postProcessing/fibers") as a,
         open_recording(copy / "spectral/postProcessing/fibers") as b,
     ):
-        for family in a.families:
-            x, y = a.families[family].positions[-1], b.families[family].positions[-1]
-            length = 2 * a.families[family].radius * a.families[family].beads
-            ends = (x - y)[:, [0, -1]]
-            result[f"{family}_error"] = float(np.sqrt(np.mean(np.sum(ends**2, axis=-1)))) / length
+        for name, family in a.families.items():
+            theirs = b.families[name].positions[-1]
+            result[f"{name}_error"] = ends_apart(family.positions[-1], theirs, family.radius)
     return result
-
-
-def _make(case: Path, copy: Path, n: int, steps: int, seed: int) -> None:
-    time = {
-        "deltaT": END_TIME / steps,
-        "endTime": END_TIME,
-        "writeControl": "timeStep",
-        "writeInterval": steps,
-    }
-    entries = {
-        "system/controlDict": time,
-        "system/blockMeshDict": {"n": n},
-        "constant/transportProperties": {"nu": VISCOSITY},
-    }
-    texts = {
-        "system/initialFieldDict": FLOW.format(seed=seed),
-        "constant/fvOptions": FORCING,
-        "constant/fiberProperties": FIBERS.format(steps=steps, interpolation="trilinear"),
-    }
-    copy_case(case, copy, entries, texts)
-
-
-def _rms(u: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.sum(u**2, axis=0))))
-
-
-def _orders(rows: list[dict]) -> list[dict]:
-    """Observed orders in the cell size between one row and the next."""
-    names = [name for name in rows[0] if name.endswith("_error")]
-    orders = []
-    for coarse, fine in itertools.pairwise(rows):
-        ratio = np.log(fine["cells"] / coarse["cells"])
-        orders.append({name: float(np.log(coarse[name] / fine[name]) / ratio) for name in names})
-    return orders
 
 
 def table(result: dict) -> str:
     """The result of `run` as text."""
-    errors = [name for name in result["rows"][0] if name.endswith("_error")]
-    head = "cells   step [s]" + "".join(f"{e.removesuffix('_error'):>12}" for e in errors)
-    lines = [head + "   OpenFOAM [s]   spectral [s]"]
-    for row in result["rows"]:
-        line = f"{row['cells']:5d} {row['time_step']:10.4g}" + "".join(f"{row[e]:12.3e}" for e in errors)
-        lines.append(line + f"{row['openfoam_seconds']:15.1f}{row['spectral_seconds']:15.1f}")
-    for order in result["orders"]:
-        lines.append("  order" + 9 * " " + "".join(f"{order[e]:12.2f}" for e in errors))
-    return "\n".join(lines)
+    return "\n".join(order_lines(result["rows"], result["orders"]))
 
 
 def draw(result: dict) -> Figure:
