@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import logging
@@ -146,7 +147,7 @@ class Fleet:
         return json.dumps([[f.name, f.count, f.beads, f.length] for f in self.families])
 
     def save(self, folder: Path, step: int, time: float) -> None:
-        """Write the whole state into a time folder; the file appears only when it is complete."""
+        """Write the whole state into a time folder; the file appears only when it is complete. OSError names it."""
         arrays = {
             f"{family.name}/{key}": value
             for family, stepper in zip(self.families, self.steppers, strict=True)
@@ -157,11 +158,16 @@ class Fleet:
         path = folder / STATE_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_suffix(".part")
-        with part.open("wb") as file:
-            file.write(buffer.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
+        try:
+            with part.open("wb") as file:
+                file.write(buffer.getbuffer())
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise OSError(error.errno, error.strerror, str(path)) from None
 
     def restore(self, folder: Path) -> None:
         """Continue from the state in a time folder. ValueError where it is of other fibers or unreadable."""
