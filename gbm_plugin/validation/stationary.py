@@ -21,7 +21,7 @@ from ..run import run_spectral
 from .averages import BLOCKS, Averages, averages, curve, density
 from .runs import checked_cells, checked_step, scene_copy
 
-FLOW = """field random; spectrum peaked; kineticEnergy 0.22; peakWavenumber 2; maxWavenumber 6; seed 1;
+FLOW = """field random; spectrum peaked; kineticEnergy 0.22; peakWavenumber 2; maxWavenumber 5; seed 1;
 """
 FORCING = """linearForcing { type linearForcing; mode constantPower; power 0.05; }
 """
