@@ -197,9 +197,10 @@ def _validate(arguments) -> dict:
             study.draw(result).savefig(arguments.figure)
     if arguments.csv:
         with open(arguments.csv, "w", newline="") as file:
-            writer = csv.DictWriter(file, list(result["rows"][0]))
+            rows = result["rows"] + result.get("temporal_rows", [])
+            writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
             writer.writeheader()
-            writer.writerows(result["rows"])
+            writer.writerows(rows)
     return result
 
 

@@ -79,11 +79,12 @@ def run(
         for name, fibers in start.items()
     }
     rows = [
-        {"cells": n, "time_step": END_TIME / steps} | _errors(found, _exact(n), reference)
+        {"against": "ABC flow", "cells": n, "time_step": END_TIME / steps}
+        | _errors(found, _exact(n), reference)
         for n, found in by_cells.items()
     ]
     temporal = [
-        {"cells": middle, "time_step": coarse.time_step}
+        {"against": "half the step", "cells": middle, "time_step": coarse.time_step}
         | _errors(coarse, fine.velocity, fine.end)
         | {"extrapolation_error": _extrapolation(start, reference, coarse.time_step)}
         for coarse, fine in itertools.pairwise(by_step)
