@@ -45,7 +45,7 @@ def _errors(axes, rows: list[dict], by: str) -> None:
         axes.set(xlabel="cells per edge" if by == "cells" else "time step [s]")
         axes.set_xticks(x, [f"{value:g}" for value in x])
         axes.minorticks_off()
-        axes.legend()
+        axes.legend(fontsize=8)
 
 
 def stationary_figure(runs: list[dict]) -> Figure:

@@ -135,30 +135,46 @@ def _summary(
 
 
 def _rows(runs: list[dict]) -> list[dict]:
-    """One row for each number and each shell of E(k): mean and standard error of every run, and the difference
-    of each from the spectral run in standard errors of the difference."""
-    reference = next(run for run in runs if run["engine"] == "spectral")
-
-    def values(run: dict) -> dict[str, tuple[float, float]]:
-        curve = run["spectrum"]
-        shells = zip(curve["k"], curve["mean"], curve["error"], strict=True)
-        return run["numbers"] | {f"E(k = {k:g})": (mean, error) for k, mean, error in shells}
-
-    known = [values(run) for run in runs]
-    names = [name for name in known[0] if all(name in v for v in known)]
+    """One row for each number and each shell of E(k): mean and standard error of every run, of OpenFOAM's two
+    finest meshes extrapolated to cells of size zero at second order, and the deviation of each from the spectral
+    run in standard errors of the difference."""
+    values = {f"{run['engine']} {run['cells']}": _values(run) for run in runs}
+    meshes = [
+        (run["cells"], values[f"openfoam {run['cells']}"]) for run in runs if run["engine"] == "openfoam"
+    ]
+    if len(meshes) > 1:
+        values["openfoam, h to 0"] = _extrapolated(*meshes[-2:])
+    reference = next(title for title in values if title.startswith("spectral "))
+    names = [name for name in values[reference] if all(name in v for v in values.values())]
     rows = []
     for name in names:
         row = {"quantity": name}
-        of_reference = values(reference)[name]
-        for run, v in zip(runs, known, strict=True):
-            title = f"{run['engine']} {run['cells']}"
-            row[title], row[f"{title} error"] = v[name]
-            if run is not reference:
-                row[f"{title} deviation"] = (v[name][0] - of_reference[0]) / np.hypot(
-                    v[name][1], of_reference[1]
-                )
+        for title, v in values.items():
+            (mean, error), (exact, chance) = v[name], values[reference][name]
+            row[title], row[f"{title} error"] = mean, error
+            if title != reference:
+                row[f"{title} deviation"] = (mean - exact) / np.hypot(error, chance)
         rows.append(row)
     return rows
+
+
+def _values(run: dict) -> dict[str, tuple[float, float]]:
+    curve = run["spectrum"]
+    shells = zip(curve["k"], curve["mean"], curve["error"], strict=True)
+    return run["numbers"] | {f"E(k = {k:g})": (mean, error) for k, mean, error in shells}
+
+
+def _extrapolated(coarse: tuple[int, dict], fine: tuple[int, dict]) -> dict[str, tuple[float, float]]:
+    """From the values at (cells, {name: (mean, error)}) by Richardson: independent runs, errors of second order."""
+    weight = 1 / ((fine[0] / coarse[0]) ** 2 - 1)
+    found = {}
+    for name in coarse[1].keys() & fine[1].keys():
+        (far, far_error), (near, near_error) = coarse[1][name], fine[1][name]
+        found[name] = (
+            near + weight * (near - far),
+            float(np.hypot((1 + weight) * near_error, weight * far_error)),
+        )
+    return found
 
 
 def solve(case: Path, folder: Path, engine: str, cells: int, time_step: float, turnovers: int) -> Path:
@@ -186,13 +202,13 @@ def solve(case: Path, folder: Path, engine: str, cells: int, time_step: float, t
 
 def table(result: dict) -> str:
     """The result of `run` as text. n: difference from the spectral run in standard errors of the difference."""
-    runs = result["runs"]
+    runs, rows = result["runs"], result["rows"]
     reference = next(run for run in runs if run["engine"] == "spectral")
-    titles = [f"{run['engine']} {run['cells']}" for run in runs]
-    deviating = [run is not reference for run in runs]
+    titles = [name for name in rows[0] if f"{name} error" in rows[0]]
+    deviating = [f"{title} deviation" in rows[0] for title in titles]
     heads = (f"{title:>24}" + "     n" * more for title, more in zip(titles, deviating, strict=True))
     lines = [" " * 28 + "".join(heads)]
-    for row in result["rows"]:
+    for row in rows:
         line = f"{row['quantity']:28}"
         for title in titles:
             line += f"{row[title]:12.5g} ± {row[f'{title} error']:9.2g}"
