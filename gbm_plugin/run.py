@@ -97,6 +97,7 @@ class _Pair:
         self.daemon: subprocess.Popen | None = None
         self.solver: subprocess.Popen | None = None
         self.stopping = 0
+        self.asked = False  # the daemon, to stop
         self.ended_here: set[subprocess.Popen] = set()  # by this process, after the other side's end
 
     def run(self) -> None:
@@ -111,6 +112,8 @@ class _Pair:
                 # the cores that the solver leaves; one that they share, if it leaves none
                 cores = max(1, len(os.sched_getaffinity(0)) - self.ranks)
                 self.daemon = self._start(daemon, d, NUMBA_NUM_THREADS=str(cores))
+                if self.stopping:  # before there was a daemon to tell
+                    self._ask_to_stop()
                 self.solver = self._start(solver, s)
                 self._watch()
         finally:
@@ -147,9 +150,15 @@ class _Pair:
         if self.stopping == 1:
             log.info("stopping: the flow is written after the step under way (once more: at once)")
             if self.daemon is not None:
-                self.daemon.terminate()  # which asks OpenFOAM to write and end
+                self._ask_to_stop()
         elif self.solver is not None:
             self.solver.terminate()
+
+    def _ask_to_stop(self) -> None:
+        """Once: the daemon then asks OpenFOAM to write and end, and a second signal would end it at once."""
+        if not self.asked:
+            self.asked = True
+            self.daemon.terminate()
 
     def _watch(self) -> None:
         """Until both have ended, or one has outlived the other for too long."""
