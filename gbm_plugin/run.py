@@ -108,6 +108,13 @@ class _Daemon:
         if share.of > 1:
             self.argv += ["--share", str(share.number)]
         self.process: subprocess.Popen | None = None
+        self._asked = False
+
+    def ask_to_stop(self) -> None:
+        """Once: the daemon then asks OpenFOAM to write and end, and a second signal would end it at once."""
+        if self.process is not None and not self._asked:
+            self._asked = True
+            self.process.terminate()
 
 
 class _Processes:
@@ -134,6 +141,8 @@ class _Processes:
         try:
             for daemon in self.daemons:
                 daemon.process = self._start(daemon.argv, daemon.log, NUMBA_NUM_THREADS=str(cores))
+                if self.stopping:  # before there was a daemon to tell
+                    daemon.ask_to_stop()
             self.solver = self._start(solver, self.solver_log)
             self._watch()
         finally:
@@ -172,8 +181,7 @@ class _Processes:
         if self.stopping == 1:
             log.info("stopping: the flow is written after the step under way (once more: at once)")
             for daemon in self.daemons:
-                if daemon.process is not None:
-                    daemon.process.terminate()  # which asks OpenFOAM to write and end
+                daemon.ask_to_stop()
         elif self.solver is not None:
             self.solver.terminate()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import logging
@@ -160,7 +161,7 @@ class Fleet:
         return json.dumps([[f.name, f.total, f.beads, f.length] for f in self.families])
 
     def save(self, folder: Path, step: int, time: float) -> None:
-        """Write the whole state into a time folder; the file appears only when it is complete."""
+        """Write the whole state into a time folder; the file appears only when it is complete. OSError names it."""
         arrays = {
             f"{family.name}/{key}": value
             for family, stepper in zip(self.families, self.steppers, strict=True)
@@ -172,11 +173,16 @@ class Fleet:
         path = path.with_name(self.share.name(path.stem, path.suffix))
         path.parent.mkdir(parents=True, exist_ok=True)
         part = path.with_suffix(".part")
-        with part.open("wb") as file:
-            file.write(buffer.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
+        try:
+            with part.open("wb") as file:
+                file.write(buffer.getbuffer())
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise OSError(error.errno, error.strerror, str(path)) from None
 
     def restore(self, folder: Path) -> None:
         """Continue from the state in a time folder, whatever daemons shared it. ValueError where it is of other

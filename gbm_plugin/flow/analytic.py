@@ -75,3 +75,38 @@ class TaylorGreen:
         gradient[..., 0, 0], gradient[..., 0, 1] = rate * cos_x * cos_y, -rate * sin_x * sin_y
         gradient[..., 1, 0], gradient[..., 1, 1] = rate * sin_x * sin_y, -rate * cos_x * cos_y
         return velocity, gradient
+
+
+class ABC:
+    """Steady Arnold–Beltrami–Childress flow of a periodic box (Dombre et al., J. Fluid Mech. 167, 353 (1986)):
+
+    u = (a sin kz + c cos ky, b sin kx + a cos kz, c sin ky + b cos kx), k = 2π/box, with ∇×u = k u. Its
+    convection is the gradient of a pressure, so that the force νk²u holds it. a, b, c [m/s]; ValueError unless
+    they are finite and box [m] is positive.
+    """
+
+    def __init__(self, a=1.0, b=1.0, c=1.0, box=2 * np.pi):
+        self.amplitudes = np.array([a, b, c], dtype=float)
+        self.box = float(box)
+        if not (np.isfinite(self.amplitudes).all() and np.isfinite(self.box) and self.box > 0):
+            raise ValueError(
+                f"a, b, c are {a}, {b}, {c} and box {box}; box must be positive, all of them finite"
+            )
+
+    def sample(self, positions, time, need="gradient"):
+        """Velocity (..., 3) at positions (..., 3); extra as in LinearFlow.sample."""
+        positions = np.asarray(positions, dtype=float)
+        a, b, c = self.amplitudes
+        wavenumber = 2 * np.pi / self.box
+        sin_x, sin_y, sin_z = np.moveaxis(np.sin(wavenumber * positions), -1, 0)
+        cos_x, cos_y, cos_z = np.moveaxis(np.cos(wavenumber * positions), -1, 0)
+        velocity = np.stack([a * sin_z + c * cos_y, b * sin_x + a * cos_z, c * sin_y + b * cos_x], axis=-1)
+        if checked(need) == "velocity":
+            return velocity, None
+        if need == "rotation":
+            return velocity, 0.5 * wavenumber * velocity
+        gradient = np.zeros((*positions.shape, 3))
+        gradient[..., 0, 1], gradient[..., 0, 2] = -c * sin_y, a * cos_z
+        gradient[..., 1, 0], gradient[..., 1, 2] = b * cos_x, -a * sin_z
+        gradient[..., 2, 0], gradient[..., 2, 1] = -b * sin_x, c * cos_y
+        return velocity, wavenumber * gradient

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,8 @@ from ..case.times import as_time
 from .recorder import SCHEMA_VERSION, FamilyRecord, Recorder
 from .restarts import kept
 from .transaction import Transaction
+
+ATTEMPTS, PAUSE = 4, 0.02  # to open a file that a run is adding to [s]
 
 __all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open_recording"]
 
@@ -166,13 +169,17 @@ class _File:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._changes = Transaction(path, writable=False)
-        try:
-            # a file that was left in the middle of a change is read through its journal
-            self.file = h5py.File(self._changes if self._changes.recovered else path, "r")
-        except OSError as error:
-            self._changes.close()
-            raise ValueError(f"{path} is not a fiber recording: {error}") from None
+        for attempt in range(1, ATTEMPTS + 1):
+            self._changes = Transaction(path, writable=False)
+            try:
+                # a file that was left in the middle of a change is read through its journal
+                self.file = h5py.File(self._changes if self._changes.recovered else path, "r")
+                break
+            except OSError as error:  # perhaps a run has changed it while it was opened
+                self._changes.close()
+                if attempt == ATTEMPTS:
+                    raise ValueError(f"{path} is not a fiber recording: {error}") from None
+                time.sleep(PAUSE)
         version = self.file.attrs.get("schema_version")
         if version != SCHEMA_VERSION:
             self.close()

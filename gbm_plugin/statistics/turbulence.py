@@ -132,6 +132,24 @@ def field_statistics(velocity: ArrayLike, box: Box, viscosity: float) -> dict[st
     return scales(*spectrum, dissipation, viscosity) | gradient_moments(longitudinal)
 
 
+def differenced_dissipation(
+    velocity: ArrayLike, box: float, viscosity: float, spacing: float
+) -> dict[str, float]:
+    """What second-order differences over `spacing` h [m] read of the dissipation of a periodic field (3, n, n, n).
+
+    gradient: nu <|grad_h u|^2> with central differences over 2h, k_i -> sin(k_i h)/h; laplacian: nu <u . lap_h u>
+    with the compact one, k_i -> 2 sin(k_i h/2)/h. The field may be given on other points than those apart by h.
+    """
+    velocity = _checked(velocity)
+    k = wavenumbers(velocity.shape[1:], box)
+    mode_energy, _ = _mode_energies(velocity)
+    readings = {
+        "gradient": sum((np.sin(c * spacing) / spacing) ** 2 for c in k),
+        "laplacian": sum((2 * np.sin(c * spacing / 2) / spacing) ** 2 for c in k),
+    }
+    return {name: 2 * viscosity * float((q * mode_energy).sum()) for name, q in readings.items()}
+
+
 def _checked(velocity: ArrayLike) -> NDArray:
     velocity = np.asarray(velocity)
     if velocity.ndim != 4 or velocity.shape[0] != 3:

@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..case.copies import HEADER, copy_case
+from ..case.copies import HEADER
+from ..case.dictionary import Dictionary
 from ..output.field import read_velocity
 from ..output.recording import open_recording
 from ..run import run as run_openfoam
 from ..run import run_spectral
+from .runs import rms, scene_copy
 
 FLOW = """field random; spectrum table; table ((1 0.08) (2 0.12) (3 0.05)); seed {seed};
 """
@@ -43,15 +45,12 @@ class State:
     """Flow and fibers at the end of a run."""
 
     velocity: NDArray[np.float64]  # at the cell centres (3, n, n, n) [m/s]
-    ends: Mapping[
-        str, NDArray[np.float64]
-    ]  # first and last bead by family (count, 2, 3), over the fiber length
+    ends: Mapping[str, NDArray[np.float64]]  # end beads by family (count, 2, 3), over the fiber length
 
 
-def check_cells(cells: int) -> None:
-    """ValueError for a number of cells that the two engines cannot both do."""
-    if cells < 8 or cells % 2:
-        raise ValueError(f"cells are {cells}; allowed: even numbers of at least 8")
+def sampling_word(case: Path | str) -> str:
+    """How the case interpolates the flow at the beads."""
+    return Dictionary.read(Path(case), "constant/fiberProperties").word("interpolation", default="trilinear")
 
 
 def make(
@@ -67,30 +66,28 @@ def make(
     cells: in each direction. steps: to END_TIME.
     changes, on top: {dictionary: {entry: value}} in place, {dictionary: text} as a whole.
     """
-    every = {
-        "system/controlDict": {
-            "deltaT": END_TIME / steps,
-            "endTime": END_TIME,
-            "writeControl": "timeStep",
-            "writeInterval": steps,
-        },
-        "system/blockMeshDict": {"n": cells},
-        "constant/transportProperties": {"nu": VISCOSITY},
-    }
-    texts = {
-        "system/initialFieldDict": FLOW.format(seed=seed),
-        "constant/fvOptions": FORCING,
-    }
+    texts = {"system/initialFieldDict": FLOW.format(seed=seed), "constant/fvOptions": FORCING}
+    entries = {}
     for name, change in (changes or {}).items():
-        (texts if isinstance(change, str) else every)[name] = change
-    copy_case(case, copy, every, texts)
+        (texts if isinstance(change, str) else entries)[name] = change
+    scene_copy(
+        case,
+        copy,
+        cells=cells,
+        steps=steps,
+        end_time=END_TIME,
+        viscosity=VISCOSITY,
+        write_every=steps,
+        texts=texts,
+        entries=entries,
+    )
 
 
-def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str | None = None) -> State:
-    """Run a copy from `make` in "openfoam" or "spectral". interpolation: of the flow at the beads; default: trilinear,
-    and exact in the spectral solver. Raises as `gbm_plugin.run.run`."""
+def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str) -> State:
+    """Run a copy from `make` in "openfoam" or "spectral". interpolation: of the flow at the beads. Raises as
+    `gbm_plugin.run.run`."""
     spectral = engine == "spectral"
-    words = FIBERS.format(steps=steps, interpolation=interpolation or ("exact" if spectral else "trilinear"))
+    words = FIBERS.format(steps=steps, interpolation=interpolation)
     (copy / "constant/fiberProperties").write_text(HEADER + words)
     (run_spectral if spectral else run_openfoam)(copy)
     folder = copy / "spectral" if spectral else copy
@@ -105,14 +102,9 @@ def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str | No
 
 def velocity_distance(a: State, b: State) -> float:
     """Rms difference of the velocities over the rms of `b`'s."""
-    return _rms(a.velocity - b.velocity) / _rms(b.velocity)
+    return rms(a.velocity - b.velocity) / rms(b.velocity)
 
 
 def fiber_distance(a: State, b: State) -> dict[str, float]:
     """Rms distance of the end beads over the fiber length, by family."""
-    return {name: _rms(np.moveaxis(x - b.ends[name], -1, 0)) for name, x in a.ends.items()}
-
-
-def _rms(u: NDArray[np.float64]) -> float:
-    """Of vectors along the first axis."""
-    return float(np.sqrt(np.mean(np.sum(u**2, axis=0))))
+    return {name: rms(np.moveaxis(x - b.ends[name], -1, 0)) for name, x in a.ends.items()}

@@ -21,8 +21,8 @@ from ..case.copies import copy_case
 from ..case.scene import read_scene
 from ..flow.stored import POINTS_IN_TIME
 from ..output.dat import read_dat
-from ..output.figures import replay_figure
 from ..output.recording import open_recording
+from ..output.study_figures import replay_figure
 from ..replay import run_stored
 from ..run import STOPPED, RunError
 from ..run import run as run_openfoam

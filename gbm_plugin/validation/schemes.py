@@ -21,6 +21,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from ..output.style import COLOURS, new_figure
 from . import comparison
 from .comparison import END_TIME, State
+from .runs import checked_cells, checked_step
 
 SCHEMES, SOLUTION = "system/fvSchemes", "system/fvSolution"
 
@@ -30,7 +31,7 @@ class Setting:
     """Dictionaries that differ from the case's. steps: of END_TIME, in units of the fewest."""
 
     changes: dict = field(default_factory=dict)
-    interpolation: str = "trilinear"
+    interpolation: str | None = None  # of the flow at the beads; None: the case's
     steps: tuple[int, ...] = (1, 2)
     same_space: bool = True  # as the case, so that their errors in time can be told from those of the mesh
 
@@ -93,6 +94,8 @@ SETTINGS = {
     "leanCubic, grad(p) cubic, fluxes leanCubic, 2 outer, 1 corrector": _space(
         _convection("Gauss leanCubic", "Gauss cubic", "leanCubic") | _correctors(2, 1), (1, 2)
     ),
+    "fibers trilinear": Setting(interpolation="trilinear", steps=(2,), same_space=False),
+    "fibers cubic": Setting(interpolation="cubic", steps=(2,), same_space=False),
     "fibers cell": Setting(interpolation="cell", steps=(2,), same_space=False),
     "fibers cellPoint": Setting(interpolation="cellPoint", steps=(2,), same_space=False),
     "fibers cellPointFace": Setting(interpolation="cellPointFace", steps=(2,), same_space=False),
@@ -110,10 +113,8 @@ def run(
     case: whose other schemes and solver settings are used. time_step: the longest, of the first of `cells` [s];
     others take it in proportion. Raises as `gbm_plugin.run.run`.
     """
-    for n in cells:
-        comparison.check_cells(n)
-    if not 0 < time_step <= END_TIME / 4:
-        raise ValueError(f"time step is {time_step:g}; allowed: positive, up to {END_TIME / 4:g}")
+    checked_cells(cells)
+    checked_step(time_step, END_TIME / 4)
     for name in settings:
         if name not in SETTINGS:
             raise ValueError(f"there is no setting '{name}'; allowed: {'; '.join(SETTINGS)}")
@@ -130,6 +131,7 @@ class _Mesh:
 
     def __init__(self, case: Path, folder: Path, cells: int, fewest: int):
         self.case, self.folder, self.cells, self.fewest = case, folder, cells, fewest
+        self.word = comparison.sampling_word(case)
         self.reference = self._spectral(4 * fewest)
         # the limit of small steps: a step at which neither correctors nor scheme matter any more
         self.limit, _ = self._openfoam(Setting(_correctors(2, 2)), 16 * fewest)
@@ -166,13 +168,13 @@ class _Mesh:
     def _spectral(self, steps: int) -> State:
         copy = self._copy()
         comparison.make(self.case, copy, self.cells, steps)
-        return comparison.run(copy, self.cells, steps, "spectral")
+        return comparison.run(copy, self.cells, steps, "spectral", "exact")
 
     def _openfoam(self, setting: Setting, steps: int) -> tuple[State, float]:
         """The state at the end, and the solver's processor time for a step [s], without its start."""
         copy = self._copy()
         comparison.make(self.case, copy, self.cells, steps, changes=setting.changes)
-        state = comparison.run(copy, self.cells, steps, "openfoam", setting.interpolation)
+        state = comparison.run(copy, self.cells, steps, "openfoam", setting.interpolation or self.word)
         times = re.findall(r"^ExecutionTime = (\S+) s", (copy / "log.pimpleFoam").read_text(), re.MULTILINE)
         return state, (float(times[-1]) - float(times[0])) / (len(times) - 1)
 

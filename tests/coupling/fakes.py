@@ -24,6 +24,7 @@ from conftest import start_solver
 
 BOX = 2 * np.pi
 PATIENCE = 60  # s, beyond any timeout of these tests
+ADDRESSES = {"socket": "gbm.sock", "tcp": "gbm.tcp", "file": "exchange/session"}
 
 
 def start_gbm(*arguments, **options) -> subprocess.Popen:
@@ -60,22 +61,65 @@ def one_line(process: subprocess.Popen, command: str) -> str:
     return errors[0]
 
 
+class Files:
+    """The transport `file` as OpenFOAM uses it, with the methods of a socket: one file for each `sendall`."""
+
+    def __init__(self, folder: Path, session: str):
+        self._folder, self._session = folder, session
+        self._sent = self._received = 0
+        self._data = b""
+        self._open = True
+
+    def sendall(self, data: bytes) -> None:
+        target = self._folder / f"{self._session}.flow.{self._sent}"
+        part = target.with_name(target.name + ".part")
+        part.write_bytes(data)
+        part.rename(target)
+        self._sent += 1
+
+    def recv(self, size: int) -> bytes:
+        if not self._data:
+            path = self._folder / f"{self._session}.fibers.{self._received}"
+            until(path.exists, f"the file {path}")
+            self._data = path.read_bytes()
+            path.unlink()
+            self._received += 1
+        data, self._data = self._data[:size], self._data[size:]
+        return data
+
+    def settimeout(self, _: float) -> None:
+        pass
+
+    def fileno(self) -> int:
+        return 0 if self._open else -1
+
+    def close(self) -> None:
+        self._open = False
+
+
 class FakeSolver:
     """OpenFOAM's side against a real `gbm daemon`."""
 
     def __init__(self, case: Path):
         self.case = case
         self.scene = read_scene(case)
+        (case / "exchange/session").unlink(missing_ok=True)  # that of a daemon that was killed
         self.daemon = start_gbm("daemon", case)
-        self.socket: socket.socket | None = None
+        self.socket: socket.socket | Files | None = None
+
+    @property
+    def address(self) -> Path:
+        """Where the daemon can be found."""
+        return self.case / ADDRESSES[self.scene.coupling.transport]
 
     def connect(self, **changes) -> None:
         """The connection and HELLO, with other values where the test wants them."""
-        tcp = self.scene.coupling.transport == "tcp"
-        path = self.case / ("gbm.tcp" if tcp else "gbm.sock")
+        transport, path = self.scene.coupling.transport, self.address
         until(lambda: path.exists() or self.daemon.poll() is not None, "the daemon's address")
         token = ""
-        if tcp:
+        if transport == "file":
+            self.socket = Files(path.parent, path.read_text().strip())
+        elif transport == "tcp":
             host, port, token = path.read_text().split()
             self.socket = socket.create_connection((host, int(port)))
         else:

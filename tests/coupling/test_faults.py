@@ -42,6 +42,18 @@ def prepared(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def by_transport(prepared):
+    """The same for each transport."""
+    cases = {"socket": prepared}
+    for transport in ("tcp", "file"):
+        case = cases[transport] = prepared.with_name(transport)
+        shutil.copytree(prepared, case, ignore=shutil.ignore_patterns("log.*", "postProcessing", "gbm.*"))
+        properties = case / "constant/fiberProperties"
+        properties.write_text(properties.read_text().replace("transport socket", f"transport {transport}"))
+    return cases
+
+
+@pytest.fixture(scope="module")
 def patient(prepared):
     """The same with a timeout that other processes' start does not exceed."""
     case = prepared.with_name("patient")
@@ -95,7 +107,7 @@ SOLVER_FAULTS = {
         "SAMPLE of step 4 has 800 bytes",
     ),
     "duplicated": (
-        lambda s: s.raw(2 * s.sample(4).encode()),
+        lambda s: [s.raw(s.sample(4).encode()) for _ in range(2)],
         "SAMPLE is of step 4, time 0.08; step 5, time 0.1",
     ),
     "out of order": (
@@ -140,9 +152,26 @@ SOLVER_FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", SOLVER_FAULTS)
-def test_daemon_with_a_solver_that_is(fault, prepared):
-    misbehave, expected = SOLVER_FAULTS[fault]
+# on the other transports those that a transport could hide; a file is a whole message or a short one
+SOLVER_FAULTS_ELSEWHERE = ("truncated", "duplicated", "out of order", "version", "NaN")
+IN_FILES = {
+    "truncated": "short message",
+    "two in one": f"SAMPLE of step 4 is followed by {40 + 8 * 6 * 72} bytes",
+}
+SOLVER_FAULTS_IN_FILES = {"two in one": (lambda s: s.raw(2 * s.sample(4).encode()), "")}
+
+
+@pytest.mark.parametrize(
+    "transport, fault",
+    [("socket", fault) for fault in SOLVER_FAULTS]
+    + [("tcp", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, "half a message, then silence")]
+    + [("file", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, *SOLVER_FAULTS_IN_FILES)],
+)
+def test_daemon_with_a_solver_that_is(transport, fault, by_transport):
+    prepared = by_transport[transport]
+    misbehave, expected = (SOLVER_FAULTS | SOLVER_FAULTS_IN_FILES)[fault]
+    if transport == "file":
+        expected = IN_FILES.get(fault, expected)
     shutil.rmtree(prepared / "postProcessing", ignore_errors=True)
     with FakeSolver(prepared) as solver:
         solver.connect()
@@ -156,7 +185,7 @@ def test_daemon_with_a_solver_that_is(fault, prepared):
         assert time.monotonic() - began < TIMEOUT + 3
     assert expected in line and str(prepared / "log.pimpleFoam") in line
     assert records(prepared) == (5 if fault == "duplicated" else 4)
-    assert not (prepared / "gbm.sock").exists()
+    assert not solver.address.exists()
 
 
 @pytest.mark.parametrize(
@@ -207,7 +236,8 @@ def _welcome(*numbers):
 def _cut(channel, first, beads):
     greet(channel, first, beads)
     channel._write(positions(1, beads).encode()[:500])
-    channel._socket.close()
+    if hasattr(channel, "_socket"):
+        channel._socket.close()
 
 
 DAEMON_FAULTS = {
@@ -274,9 +304,19 @@ DAEMON_FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", DAEMON_FAULTS)
-def test_pimplefoam_with_a_daemon_that_is(fault, prepared):
+DAEMON_FAULTS_ELSEWHERE = ("truncated", "short", "duplicated", "out of order", "version", "NaN")
+
+
+@pytest.mark.parametrize(
+    "transport, fault",
+    [("socket", fault) for fault in DAEMON_FAULTS]
+    + [(transport, fault) for transport in ("tcp", "file") for fault in DAEMON_FAULTS_ELSEWHERE],
+)
+def test_pimplefoam_with_a_daemon_that_is(transport, fault, by_transport):
+    prepared = by_transport[transport]
     misbehave, expected = DAEMON_FAULTS[fault]
+    if transport == "file" and fault == "truncated":
+        expected = "message of the wrong length in"
     line = fake_daemon(prepared, misbehave)
     assert expected in line
     assert "daemon on" in line and f"its log: {prepared}/log.gbmDaemon" in line
@@ -516,6 +556,20 @@ def test_disk_full_while_recording(long_case, small_disk):
     kept = int(line.split("all records up to step ")[1].split()[0])
     assert records(long_case) == kept + 1
     assert kept > 10
+
+
+def test_disk_full_while_the_state_of_the_fibers_is_written(long_case, small_disk):
+    small_disk(long_case / "0.08/uniform", "8k")
+    with FakeSolver(long_case) as solver:
+        solver.connect()
+        solver.serve_until(4)
+        solver.raw(Message(Kind.SAVE, 4, 0.08, b"0.08").encode() + solver.sample(4).encode())
+        assert "No space left" in solver.last_word()
+        solver.close()
+        line = one_line(solver.daemon, "daemon")
+    assert f"No space left on device: '{long_case}/0.08/uniform/fibers.npz'" in line
+    assert not list((long_case / "0.08/uniform").iterdir())
+    assert records(long_case) == 4
 
 
 def test_disk_full_while_openfoam_writes(prepared, small_disk, tmp_path):

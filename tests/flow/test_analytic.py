@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from gbm_plugin.flow import LinearFlow, TaylorGreen
+from gbm_plugin.case.fields import abc
+from gbm_plugin.flow import ABC, LinearFlow, TaylorGreen
 
 POINTS = np.random.default_rng(0).uniform(-3, 3, (4, 5, 3))
 
@@ -23,7 +24,11 @@ def test_simple_shear_fixes_the_convention():
 
 @pytest.mark.parametrize(
     "flow",
-    [TaylorGreen(1.7, 0.6), LinearFlow([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6], [0.7, 0.8, -0.6]], (1, 2, 3))],
+    [
+        TaylorGreen(1.7, 0.6),
+        LinearFlow([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6], [0.7, 0.8, -0.6]], (1, 2, 3)),
+        ABC(1.0, 0.7, -0.4, box=5.0),
+    ],
 )
 def test_gradient_and_rotation_are_those_of_the_velocity(flow):
     _, gradient = flow.sample(POINTS, 0.0, "gradient")
@@ -44,7 +49,34 @@ def test_taylor_green_is_equation_12():
     np.testing.assert_allclose(velocity, [3 * np.sin(x) * np.cos(y), -3 * np.cos(x) * np.sin(y), 0])
 
 
+def test_abc_is_a_beltrami_flow():
+    """Free of divergence, and its vorticity, by finite differences of the velocity, is 2π/box times itself."""
+    flow, h = ABC(1.0, 0.7, -0.4, box=5.0), 1e-4
+    difference = np.stack(
+        [
+            (flow.sample(POINTS + e, 0.0)[0] - flow.sample(POINTS - e, 0.0)[0]) / (2 * h)
+            for e in h * np.eye(3)
+        ],
+        axis=-1,
+    )
+    np.testing.assert_allclose(np.trace(difference, axis1=-2, axis2=-1), 0, atol=1e-10)
+    curl = np.stack([difference[..., (i + 2) % 3, (i + 1) % 3] for i in range(3)], -1) - np.stack(
+        [difference[..., (i + 1) % 3, (i + 2) % 3] for i in range(3)], -1
+    )
+    np.testing.assert_allclose(curl, 2 * np.pi / 5 * flow.sample(POINTS, 0.0)[0], atol=1e-8)
+
+
+def test_abc_is_the_initial_field_of_that_name():
+    x = np.stack(np.meshgrid(*3 * [2 * np.pi * np.arange(8) / 8], indexing="ij"), -1)
+    velocity, _ = ABC(1.0, 0.7, -0.4).sample(x, 0.0)
+    np.testing.assert_allclose(
+        abc(1.0, 0.7, -0.4).on_lattice((8, 8, 8)), np.moveaxis(velocity, -1, 0), atol=1e-14
+    )
+
+
 def test_bad_input_is_refused():
+    with pytest.raises(ValueError, match="box must be positive"):
+        ABC(box=-1.0)
     with pytest.raises(ValueError, match="allowed are velocity, rotation, gradient"):
         TaylorGreen(1.0, 1.0).sample(POINTS, 0.0, "strain")
     with pytest.raises(ValueError, match="width must be positive"):

@@ -104,3 +104,20 @@ def test_refusals():
         turbulence.energy_spectrum(np.zeros((8, 8, 8)), 1.0)
     with pytest.raises(ValueError, match="box must be positive"):
         turbulence.energy_spectrum(np.zeros((3, 8, 8, 8)), -1.0)
+
+
+def test_differenced_dissipation_is_that_of_the_differences():
+    """On the points of the field itself, the same as differences taken there; far finer, the dissipation."""
+    n, nu = 12, 0.3
+    u = np.random.default_rng(5).standard_normal((3, n, n, n))
+    h = 2 * np.pi / n
+    read = turbulence.differenced_dissipation(u, 2 * np.pi, nu, h)
+    central = [(np.roll(u, -1, axis) - np.roll(u, 1, axis)) / (2 * h) for axis in (1, 2, 3)]
+    assert read["gradient"] == pytest.approx(nu * sum((g**2).sum(0).mean() for g in central))
+    compact = sum((np.roll(u, -1, axis) - 2 * u + np.roll(u, 1, axis)) / h**2 for axis in (1, 2, 3))
+    assert read["laplacian"] == pytest.approx(-nu * (u * compact).sum(0).mean())
+    exact = turbulence.field_statistics(u, 2 * np.pi, nu)["dissipation"]
+    fine = turbulence.differenced_dissipation(u, 2 * np.pi, nu, 1e-3)
+    assert fine["gradient"] == pytest.approx(exact, rel=1e-4) and fine["laplacian"] == pytest.approx(
+        exact, rel=1e-4
+    )
