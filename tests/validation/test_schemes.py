@@ -32,5 +32,5 @@ def test_what_is_known_of_schemes():
 def test_bad_input_is_named():
     with pytest.raises(ValueError, match="there is no setting 'Eular'"):
         schemes.run(DEFAULT_CASE, settings=["Eular"])
-    with pytest.raises(ValueError, match="cells are 7"):
+    with pytest.raises(ValueError, match=r"cells are \(7,\)"):
         schemes.run(DEFAULT_CASE, [7])
