@@ -14,7 +14,7 @@ from pathlib import Path
 from ..case.scene import Coupling
 from ..case.share import Share
 from .channel import Channel, CouplingError, Listener
-from .message import Kind, Message
+from .message import MAX_TEXT, Kind, Message
 
 PARTING = 1.0  # how long the other side may take to end a connection [s]
 POLL = 0.2  # how often a wait for the first connection looks whether to give up [s]
@@ -54,6 +54,8 @@ class SocketChannel(Channel):
 
     def _write(self, *parts: bytes | memoryview) -> None:
         deadline = time.monotonic() + self.timeout
+        if sum(map(len, parts)) <= MAX_TEXT:  # a small message in one packet
+            parts = (b"".join(parts),)
         for view in map(memoryview, parts):
             while view:
                 self._wait(select.POLLOUT, deadline)

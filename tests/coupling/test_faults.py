@@ -291,16 +291,16 @@ DAEMON_FAULTS = {
         "was silent for",
     ),
     "welcome without families": (_welcome(1, 0), "WELCOME has 16 bytes"),
-    "welcome with a negative count": (_welcome(1, 1, -3, 4), "WELCOME holds numbers that are not allowed"),
+    "welcome with a negative count": (_welcome(1, 1, -3, 4, 0), "WELCOME holds numbers that are not allowed"),
     "welcome with too many beads": (
-        _welcome(1, 1, 1 << 40, 1 << 40),
+        _welcome(1, 1, 1 << 40, 1 << 40, 0),
         "WELCOME holds numbers that are not allowed",
     ),
     "welcome with fewer families than said": (
-        _welcome(1, 9, 3, 4),
+        _welcome(1, 9, 3, 4, 0),
         "WELCOME holds numbers that are not allowed",
     ),
-    "welcome that wants the unknown": (_welcome(7, 1, 3, 4), "WELCOME holds numbers that are not allowed"),
+    "welcome that wants the unknown": (_welcome(7, 1, 3, 4, 0), "WELCOME holds numbers that are not allowed"),
 }
 
 
