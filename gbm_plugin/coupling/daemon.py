@@ -232,7 +232,9 @@ class Session:
     def _send_positions(self) -> None:
         flags = (PROVISIONAL if self.fleet.provisional else 0) | (STOP if self.stop else 0)
         payload = encode_array(self.fleet.positions)
-        self.sent_at = clock.time()  # when it begins: what no buffer holds waits there until the solver reads it
+        self.sent_at = (
+            clock.time()
+        )  # when it begins: what no buffer holds waits there until the solver reads it
         self.channel.send(Message(Kind.POSITIONS, self.step, self.time, payload, flags))
 
     def _observe(self) -> bool:

@@ -28,17 +28,22 @@ def solve(path, ranks: int = 1) -> np.ndarray:
     return fluidfoam.readfield(str(path), TIME, "U", verbose=False)
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_the_values_of_cubic(tmp_path, ranks):
-    """On a mesh whose cells grow, where the weights of faces are not one half."""
+@pytest.mark.parametrize(
+    "grading, ranks, n",
+    [("2 1 0.5", 1, None), ("2 1 0.5", 2, (2, 1, 1)), ("1 1 1", 1, None), ("1 1 1", 4, (2, 1, 2))],
+    ids=["graded", "graded on ranks", "uniform", "uniform on ranks"],
+)
+def test_the_values_of_cubic(tmp_path, grading, ranks, n):
+    """On a mesh whose cells grow, where the weights of faces are not one half; and on one of equal cells, where four
+    in a row are taken, those on other ranks too."""
     fields = {}
     for scheme in ("leanCubic", "cubic", "linear"):
         path = prepare(tmp_path / scheme, f"Gauss {scheme}")
         block = path / "system/blockMeshDict"
-        block.write_text(block.read_text().replace("simpleGrading (1 1 1)", "simpleGrading (2 1 0.5)"))
+        block.write_text(block.read_text().replace("simpleGrading (1 1 1)", f"simpleGrading ({grading})"))
         utility(path, "blockMesh")
         if ranks > 1:
-            divide(path, ranks, (2, 1, 1))
+            divide(path, ranks, n)
         fields[scheme] = solve(path, ranks)
     scale = np.abs(fields["cubic"]).max()
     np.testing.assert_allclose(fields["leanCubic"], fields["cubic"], rtol=0, atol=1e-10 * scale)

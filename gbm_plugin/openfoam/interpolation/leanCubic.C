@@ -1,5 +1,6 @@
 #include "leanCubic.H"
 #include "fvMesh.H"
+#include "latticeFaces.H"
 
 namespace Foam
 {
@@ -34,15 +35,11 @@ vector cubicLessLinear
       + sqr(w)*(w - 1)*sn;
 }
 
-}
 
-
-Foam::tmp<Foam::surfaceVectorField> Foam::leanCubic::correction
-(
-    const volVectorField& U
-) const
+//- The correction by the slopes on both sides of each face, on any mesh
+void fromSlopes(const volVectorField& U, surfaceVectorField& correction)
 {
-    const fvMesh& mesh = this->mesh();
+    const fvMesh& mesh = U.mesh();
     const labelUList& owner = mesh.owner();
     const labelUList& neighbour = mesh.neighbour();
     const surfaceScalarField& weights = mesh.weights();
@@ -53,24 +50,6 @@ Foam::tmp<Foam::surfaceVectorField> Foam::leanCubic::correction
     const tmp<volTensorField> tgradient(fv::gaussGrad<vector>(mesh).grad(U));
     const volTensorField& gradient = tgradient();
 
-    tmp<surfaceVectorField> tcorrection
-    (
-        new surfaceVectorField
-        (
-            IOobject
-            (
-                "leanCubic::correction(" + U.name() + ')',
-                mesh.time().timeName(),
-                mesh,
-                IOobject::NO_READ,
-                IOobject::NO_WRITE,
-                false
-            ),
-            mesh,
-            dimensioned<vector>(U.dimensions(), Zero)
-        )
-    );
-    surfaceVectorField& correction = tcorrection.ref();
     vectorField& inside = correction.primitiveFieldRef();
 
     forAll(owner, facei)
@@ -117,6 +96,93 @@ Foam::tmp<Foam::surfaceVectorField> Foam::leanCubic::correction
                 d[i] & tgradientn()[i]
             );
         }
+    }
+}
+
+
+//- The correction by the four cells in a row of a uniform mesh
+void fromRows
+(
+    const volVectorField& U,
+    const latticeFaces& faces,
+    surfaceVectorField& correction
+)
+{
+    const vectorField& cells = U.primitiveField();
+    const List<vector> neighbours(faces.cells().gather(cells));
+    const label nCells = cells.size();
+    const label* slots = faces.cells().slots().cdata();
+
+    const auto value = [&](const label slot) -> const vector&
+    {
+        const label i = slots[slot];
+        return i < nCells ? cells[i] : neighbours[i - nCells];
+    };
+    const auto atFace = [&](const label facei)
+    {
+        const label p = faces.owner(facei);
+        const label step = faces.step(facei);
+
+        return
+            (1.0/16)
+           *(
+                (value(p) + value(p + step))
+              - (value(p - step) + value(p + 2*step))
+            );
+    };
+
+    vectorField& inside = correction.primitiveFieldRef();
+    forAll(inside, facei)
+    {
+        inside[facei] = atFace(facei);
+    }
+
+    for (fvsPatchVectorField& values : correction.boundaryFieldRef())
+    {
+        const label start = values.patch().start();
+        forAll(values, i)
+        {
+            values[i] = atFace(start + i);
+        }
+    }
+}
+
+}
+
+
+Foam::tmp<Foam::surfaceVectorField> Foam::leanCubic::correction
+(
+    const volVectorField& U
+) const
+{
+    const fvMesh& mesh = this->mesh();
+
+    tmp<surfaceVectorField> tcorrection
+    (
+        new surfaceVectorField
+        (
+            IOobject
+            (
+                "leanCubic::correction(" + U.name() + ')',
+                mesh.time().timeName(),
+                mesh,
+                IOobject::NO_READ,
+                IOobject::NO_WRITE,
+                false
+            ),
+            mesh,
+            dimensioned<vector>(U.dimensions(), Zero)
+        )
+    );
+
+    const latticeFaces& faces = latticeFaces::New(mesh);
+    if (faces.uniform())
+    {
+        fromRows(U, faces, tcorrection.ref());
+    }
+    else
+    {
+        fromSlopes(U, tcorrection.ref());
     }
 
     return tcorrection;

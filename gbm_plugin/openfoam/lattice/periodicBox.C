@@ -42,6 +42,26 @@ Foam::periodicBox::periodicBox(const fvMesh& mesh)
 }
 
 
+bool Foam::periodicBox::fills(const fvMesh& mesh)
+{
+    for (const polyPatch& patch : mesh.boundaryMesh())
+    {
+        const label faces = returnReduce(patch.size(), sumOp<label>());
+        const cyclicPolyPatch* cyclic = isA<cyclicPolyPatch>(patch);
+        const bool turned = cyclic && patch.size() && !cyclic->parallel();
+
+        if (faces && (!patch.coupled() || returnReduce(turned, orOp<bool>())))
+        {
+            return false;
+        }
+    }
+
+    const vector L(mesh.bounds().span());
+
+    return mag(gSum(mesh.V().field())/(L.x()*L.y()*L.z()) - 1) <= 1e-6;
+}
+
+
 Foam::point Foam::periodicBox::wrap(const point& p) const
 {
     const vector L = span();
