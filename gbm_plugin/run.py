@@ -235,6 +235,8 @@ class _Processes:
                 ended_by = signal.Signals(-d.process.returncode).name
                 causes.append(f"{d.share} was ended by {ended_by} ({d.log})")
         errors = [(error, d.log) for d in self.daemons if (error := _last_error(d.log))]
+        # where the solver repeats what one of them said, the others only lost the solver
+        errors = [(error, file) for error, file in errors if problem and error in problem] or errors
         if not problem or "the daemon stopped:" in problem:
             causes += [f"{error} ({file})" for error, file in errors]
         if problem and not (errors and "the daemon stopped:" in problem):

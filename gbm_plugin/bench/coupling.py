@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from ..case.copies import copy_case
+from ..case.scene import read_scene
 from ..case.share import all_shares
 from ..output.dat import read_dat
 from ..run import run as run_case
 
 FIBERS = """coupling {{ transport {transport}; daemons {daemons}; }}
 recordInterval {never};
+interpolation {interpolation};
 families {{ bench {{ count {fibers}; beads {beads}; length {length}; bendingStiffness 1e-5; seed 1; }} }}
 """
 SLABS = """numberOfSubdomains {ranks};
@@ -40,6 +42,7 @@ def run(
     hides as long as it is longer. Raises CaseError and RunError as `run.run`.
     """
     case = Path(case)
+    word = read_scene(case).interpolation
     with tempfile.TemporaryDirectory(prefix="gbm-bench-") as folder:
         copy = Path(folder) / "case"
         entries = {
@@ -48,7 +51,9 @@ def run(
         }
         sizes = {"fibers": fibers, "beads": beads, "length": 0.1 * beads, "never": 10 * steps}
         texts = {
-            "constant/fiberProperties": FIBERS.format(transport=transport, daemons=daemons, **sizes),
+            "constant/fiberProperties": FIBERS.format(
+                transport=transport, daemons=daemons, interpolation=word, **sizes
+            ),
             "system/decomposeParDict": SLABS.format(ranks=ranks),
         }
         copy_case(case, copy, entries, texts)
@@ -64,6 +69,7 @@ def run(
         "fibers": fibers,
         "beads": beads,
         "transport": transport,
+        "interpolation": word,
         "ranks": ranks,
         "daemons": daemons,
         "step": step,
@@ -78,7 +84,8 @@ def run(
 def table(result: dict) -> str:
     """The result of `run` as text."""
     lines = [
-        f"{result['cells']}^3 cells, {result['fibers']} fibers x {result['beads']} beads, {result['transport']}, "
+        f"{result['cells']}^3 cells, {result['fibers']} fibers x {result['beads']} beads, "
+        f"{result['interpolation']}, {result['transport']}, "
         f"{result['ranks']} rank(s), {result['daemons']} daemon(s): step {1e3 * result['step']:.1f} ms"
     ]
     for name in PARTS:

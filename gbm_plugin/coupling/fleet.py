@@ -15,7 +15,7 @@ import numpy as np
 
 from ..case.dictionary import CaseError
 from ..case.scene import Family, Scene
-from ..case.share import WHOLE, Share
+from ..case.share import WHOLE, Share, all_shares
 from ..case.times import STATE_FILE, fiber_state
 from ..fiber import Fibers, Stepper, merged_states
 from ..statistics.fibers import end_to_end_squared_ratio
@@ -189,17 +189,21 @@ class Fleet:
         fibers or unreadable."""
         self._positions = None
         paths = fiber_state(folder)
+        if not paths:
+            raise CaseError(f"{folder} holds no complete fiber state")
         states = [self._read_state(path) for path in paths]
+        shares = all_shares(len(paths))
         for family, stepper in zip(self.families, self.steppers, strict=True):
-            prefix = f"{family.name}/"
-            own = [
-                {key.removeprefix(prefix): value for key, value in state.items() if key.startswith(prefix)}
-                for state in states
-            ]
+            end = family.first + family.count
+            parts = [share.part(family.total) for share in shares]
+            # only the files that hold some of these fibers: a part of a family has its own sub-steps
+            held = [n for n, part in enumerate(parts) if part.start < end and family.first < part.stop]
+            own = [_of_family(states[n], family.name) for n in held]
+            offset = parts[held[0]].start
             try:
-                stepper.restore(merged_states(own, slice(family.first, family.first + family.count)))
+                stepper.restore(merged_states(own, slice(family.first - offset, end - offset)))
             except (KeyError, ValueError) as error:
-                raise CaseError(f"the fiber state {paths[0]} cannot be read: {error}") from None
+                raise CaseError(f"the fiber state {paths[held[0]]} cannot be read: {error}") from None
 
     def _read_state(self, path: Path) -> dict[str, np.ndarray]:
         try:
@@ -215,6 +219,11 @@ class Fleet:
                 "restore the dictionary, or start afresh"
             )
         return state
+
+
+def _of_family(state: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    prefix = f"{name}/"
+    return {key.removeprefix(prefix): value for key, value in state.items() if key.startswith(prefix)}
 
 
 def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int, int]) -> np.ndarray | None:

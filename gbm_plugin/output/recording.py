@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..case.share import shared_files
+from ..case.share import all_shares, shared_files
 from ..case.times import as_time
 from .recorder import SCHEMA_VERSION, FamilyRecord, Recorder
 from .restarts import kept
@@ -231,6 +232,19 @@ def _by_start(folder: Path) -> list[list[Path]]:
     return [files for _, path in starts if (files := shared_files(path, "fibers", ".h5"))]
 
 
+def _with_partners(path: Path) -> list[list[Path]]:
+    """The files of a run of which this is one: itself, or those of all daemons that shared the fibers."""
+    match = re.fullmatch(r"(.*)\.\d+of(\d+)(\.\w+)", path.name)
+    if match is None:
+        return [[path]]
+    stem, of, suffix = match.groups()
+    partners = [path.with_name(share.name(stem, suffix)) for share in all_shares(int(of))]
+    missing = [p.name for p in partners if not p.is_file()]
+    if missing:
+        raise ValueError(f"{path} holds a part of the fibers; {', '.join(missing)} beside it is missing")
+    return [partners]
+
+
 def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
     """Open a recording: one file, a folder ``postProcessing/fibers`` of a case, or a list of files.
 
@@ -241,7 +255,8 @@ def open_recording(paths: Path | str | Iterable[Path | str]) -> Recording:
     paths = [paths] if isinstance(paths, (str, Path)) else list(paths)
     files = []
     for path in map(Path, paths):
-        files += _by_start(path) if path.is_dir() else [[path]]
+        files += _by_start(path) if path.is_dir() else _with_partners(path)
+    files = [list(shared) for shared in dict.fromkeys(map(tuple, files))]
     if not files:
         raise FileNotFoundError(f"no fiber recording ({', '.join(map(str, paths)) or 'an empty list'})")
     parts: list[_Part] = []

@@ -7,11 +7,15 @@ import re
 import shutil
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from gbm_plugin.case.scene import Family, Model
 from gbm_plugin.case.share import Share, all_shares, shared_files
+from gbm_plugin.coupling.fleet import Fleet
+from gbm_plugin.flow import TaylorGreen
 from gbm_plugin.output.recording import open_recording
 
 from conftest import divide, gbm, make_case, run_case, set_entry, start_solver
@@ -97,6 +101,55 @@ def test_their_number_may_change_at_every_restart(tmp_path, one):
     with np.load(case / "0.4/uniform/fibers.npz") as a, np.load(one / "0.4/uniform/fibers.npz") as b:
         for name in b.files:
             np.testing.assert_array_equal(a[name], b[name], err_msg=name)
+
+
+def test_shares_that_took_different_sub_steps_restart_to_the_last_bit(tmp_path):
+    """Bent discrete rods ask for shorter sub-steps, those of one share for other ones than those of the other."""
+    model = Model(curvature_law="discreteRod")
+    family = Family("rods", 20, 8, 1.0, 1e-3, 1, "straight", model)
+
+    def fleets():
+        for share in all_shares(2):
+            own = family.part(share)
+            scene = SimpleNamespace(families=(own,), dynamic_viscosity=1e-2)
+            yield Fleet.seeded(scene, np.zeros(3), np.ones(3), 0.0, share)
+
+    def step(fleet):
+        flow = TaylorGreen(0.3, 4.0 if fleet.share.number == 1 else 0.1)
+        fleet.advance(0.02)
+        while True:
+            provisional = fleet.provisional
+            fleet.observe(fleet.time, *flow.sample(fleet.positions, fleet.time, "rotation"))
+            if not provisional:
+                return
+            fleet.correct()
+
+    going, restarted = list(fleets()), list(fleets())
+    for fleet in going:
+        fleet.observe(0.0, *TaylorGreen(0.3, 1.0).sample(fleet.positions, 0.0, "rotation"))
+        for _ in range(8):
+            step(fleet)
+        fleet.save(tmp_path, 8, fleet.time)
+    assert len({fleet.steppers[0].report()["substeps"] for fleet in going}) == 2
+    for fleet, again in zip(going, restarted, strict=True):
+        again.restore(tmp_path)
+        step(fleet)
+        step(again)
+        np.testing.assert_array_equal(again.positions, fleet.positions)
+
+
+def test_recordings_of_all_daemons_are_one(one, tmp_path):
+    case = make(tmp_path / "case", 2)
+    run_case(case)
+    whole = recorded(one)
+    files = sorted(case.glob("postProcessing/fibers/0/fibers.*of2.h5"))
+    for given in (files, files[::-1], files[1:]):
+        with open_recording(given) as recording:
+            families = [f.positions[:].reshape(STEPS + 1, -1, 3) for f in recording.families.values()]
+            np.testing.assert_array_equal(np.concatenate(families, axis=1), whole)
+    files[0].unlink()
+    with pytest.raises(ValueError, match=r"fibers\.1of2\.h5 beside it is missing"):
+        open_recording(files[1])
 
 
 def test_a_time_without_one_of_the_states_is_not_complete(tmp_path, one):
