@@ -27,21 +27,27 @@ def trilinear(fields, points, out):
 
 
 @njit(nogil=True, cache=True)
+def _cubic_row(x, count, weights, nodes):
+    """The four of `count` periodic nodes around x, and Lagrange's weights of them; returns the place in between."""
+    i = int(np.floor(x))
+    s = x - i
+    weights[0] = -s * (s - 1) * (s - 2) / 6
+    weights[1] = (s + 1) * (s - 1) * (s - 2) / 2
+    weights[2] = -(s + 1) * s * (s - 2) / 2
+    weights[3] = (s + 1) * s * (s - 1) / 6
+    for q in range(4):
+        nodes[q] = (i - 1 + q) % count
+    return s
+
+
+@njit(nogil=True, cache=True)
 def cubic(fields, points, out):
     """As `trilinear`, with Lagrange cubics through the four nearest nodes in each direction. Error O(h^4)."""
     weights = np.empty((3, 4))
     nodes = np.empty((3, 4), np.intp)
     for p in range(points.shape[0]):
         for d in range(3):
-            x = points[p, d]
-            i = int(np.floor(x))
-            s = x - i
-            weights[d, 0] = -s * (s - 1) * (s - 2) / 6
-            weights[d, 1] = (s + 1) * (s - 1) * (s - 2) / 2
-            weights[d, 2] = -(s + 1) * s * (s - 2) / 2
-            weights[d, 3] = (s + 1) * s * (s - 1) / 6
-            for q in range(4):
-                nodes[d, q] = (i - 1 + q) % fields.shape[1 + d]
+            _cubic_row(points[p, d], fields.shape[1 + d], weights[d], nodes[d])
         for m in range(fields.shape[0]):
             total = 0.0
             for i in range(4):
@@ -69,19 +75,11 @@ def _cubic_slopes(fields, points, out):
     nodes = np.empty((3, 4), np.intp)
     for p in range(points.shape[0]):
         for d in range(3):
-            x = points[p, d]
-            i = int(np.floor(x))
-            s = x - i
-            weights[d, 0] = -s * (s - 1) * (s - 2) / 6
-            weights[d, 1] = (s + 1) * (s - 1) * (s - 2) / 2
-            weights[d, 2] = -(s + 1) * s * (s - 2) / 2
-            weights[d, 3] = (s + 1) * s * (s - 1) / 6
+            s = _cubic_row(points[p, d], fields.shape[1 + d], weights[d], nodes[d])
             slopes[d, 0] = -(3 * s * s - 6 * s + 2) / 6
             slopes[d, 1] = (3 * s * s - 4 * s - 1) / 2
             slopes[d, 2] = -(3 * s * s - 2 * s - 2) / 2
             slopes[d, 3] = (3 * s * s - 1) / 6
-            for q in range(4):
-                nodes[d, q] = (i - 1 + q) % fields.shape[1 + d]
         for m in range(fields.shape[0]):
             dx = dy = dz = 0.0
             for i in range(4):
