@@ -29,7 +29,7 @@ def main(argv: list[str] | None = None) -> int:
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
     try:
         from .coupling.channel import CouplingError
-        from .run import RunError
+        from .run.openfoam import RunError
 
         expected = (ValueError, CouplingError, RunError, OSError, FloatingPointError)
         result = arguments.action(arguments)
@@ -172,7 +172,7 @@ def _add_json(sub: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments) -> None:
-    from . import run
+    from .run import openfoam as run
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, until the run has its own way
     if arguments.parallel and arguments.flow != "openfoam":
@@ -197,7 +197,7 @@ def _daemon(arguments) -> None:
 
 
 def _report(arguments) -> dict:
-    from .output.report import report
+    from .report.report import report
 
     return report(Path(arguments.case))
 
@@ -217,7 +217,7 @@ def _validate(arguments) -> dict:
     result = study.run(arguments.case, **{name: value for name, value in given.items() if value is not None})
     print(study.table(result))
     if arguments.figure:
-        from .output.style import styled
+        from .report.style import styled
 
         with styled():
             study.draw(result).savefig(arguments.figure)
@@ -231,7 +231,7 @@ def _validate(arguments) -> dict:
 
 
 def _bench_coupling(arguments) -> dict:
-    from .bench import coupling
+    from .studies.bench import coupling
 
     names = ("cells", "fibers", "beads", "steps", "transport", "ranks", "daemons")
     result = coupling.run(arguments.case, **{name: getattr(arguments, name) for name in names})
@@ -240,7 +240,7 @@ def _bench_coupling(arguments) -> dict:
 
 
 def _bench_fibers(arguments) -> dict:
-    from .bench import fibers
+    from .studies.bench import fibers
 
     result = fibers.run(arguments.fibers, arguments.beads, quick=arguments.quick)
     print(fibers.table(result))
@@ -248,7 +248,7 @@ def _bench_fibers(arguments) -> dict:
 
 
 def _bench_spectral(arguments) -> dict:
-    from .bench import spectral
+    from .studies.bench import spectral
 
     result = spectral.run(arguments.cells, arguments.threads, fluidsim_python=arguments.fluidsim)
     print(spectral.table(result))

@@ -15,6 +15,9 @@ import pytest
 from gbm_plugin.case.openfoam import environment
 from gbm_plugin.case.prepare import initial_fields, utility
 from gbm_plugin.case.scene import read_scene
+from gbm_plugin.output.recording import Recorder
+
+from sample_records import FAMILIES, SCENE, records
 
 DEFAULT_CASE = Path(__file__).parents[1] / "openfoam_case"
 
@@ -145,3 +148,17 @@ def start_solver(path: Path, ranks: int = 1) -> subprocess.Popen:
         argv = ["mpirun", "-np", str(ranks), "--oversubscribe", *argv, "-parallel"]
     with (path / "log.pimpleFoam").open("w") as log:
         return subprocess.Popen(argv, env=environment(), stdout=log, stderr=subprocess.STDOUT)
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a recording of the steps given, 0.1 s apart, to <folder>/fibers.h5 and return its path."""
+
+    def write(steps, folder="0"):
+        path = tmp_path / "postProcessing" / "fibers" / folder / "fibers.h5"
+        with Recorder(path, FAMILIES, **SCENE) as recorder:
+            for step in steps:
+                recorder.append(step, 0.1 * step, records(step))
+        return path
+
+    return write

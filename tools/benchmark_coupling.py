@@ -20,7 +20,7 @@ import argparse
 import json
 from pathlib import Path
 
-from gbm_plugin.bench.coupling import run
+from gbm_plugin.studies.bench.coupling import run
 
 BEADS = 20
 FEW, MANY = 1000, 20_000  # fibers

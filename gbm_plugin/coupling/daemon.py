@@ -22,10 +22,11 @@ from ..case.lock import DAEMON, locked
 from ..case.scene import Family, Scene, read_scene
 from ..case.share import Share
 from ..case.times import as_time, fiber_state
+from ..fleet.fleet import Fleet
+from ..fleet.steptable import StepTable
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
 from .channel import Channel, CouplingError, Listener, listen
-from .fleet import Fleet
 from .message import (
     PROVISIONAL,
     STOP,
@@ -39,7 +40,6 @@ from .message import (
     encode_welcome,
     sample_size,
 )
-from .steptable import StepTable
 
 log = logging.getLogger(__name__)
 

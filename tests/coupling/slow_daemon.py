@@ -3,7 +3,8 @@
 import sys
 import time
 
-from gbm_plugin.coupling import daemon, fleet
+from gbm_plugin.coupling import daemon
+from gbm_plugin.fleet import fleet
 
 
 class SlowFleet(fleet.Fleet):

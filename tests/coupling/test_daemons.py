@@ -14,7 +14,7 @@ import pytest
 
 from gbm_plugin.case.scene import Family, Model
 from gbm_plugin.case.share import Share, all_shares, shared_files
-from gbm_plugin.coupling.fleet import Fleet
+from gbm_plugin.fleet.fleet import Fleet
 from gbm_plugin.flow import TaylorGreen
 from gbm_plugin.output.recording import open_recording
 

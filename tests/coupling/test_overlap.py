@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gbm_plugin.output.dat import read_dat
+from gbm_plugin.output.tables import read_dat
 
 from conftest import make_case, start_solver
 

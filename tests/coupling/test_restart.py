@@ -9,8 +9,8 @@ import signal
 import numpy as np
 import pytest
 
-from gbm_plugin.output.dat import read_dat
 from gbm_plugin.output.recording import open_recording
+from gbm_plugin.output.tables import read_dat
 
 from conftest import gbm, make_case, run_case, set_entry
 from fakes import Run, kill_all_of

@@ -10,8 +10,8 @@ import pytest
 
 from gbm_plugin.case.initial import write_velocity
 from gbm_plugin.case.openfoam import utility
-from gbm_plugin.output.dat import read_dat
 from gbm_plugin.output.field import read_velocity
+from gbm_plugin.output.tables import read_dat
 
 from conftest import divide, make_case, start_solver
 

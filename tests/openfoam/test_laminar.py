@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gbm_plugin.case.openfoam import command, environment, fatal_message
-from gbm_plugin.output.dat import read_dat
+from gbm_plugin.output.tables import read_dat
 
 from conftest import HEADER, make_case, set_entry, start_solver
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gbm_plugin.output.dat import read_dat
+from gbm_plugin.output.tables import read_dat
 
 from conftest import HEADER, make_case, set_entry, start_solver
 

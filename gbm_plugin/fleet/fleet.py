@@ -1,0 +1,238 @@
+"""All families of a scene as one: flat bead arrays outside, one stepper for each family inside."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import logging
+import os
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..case.dictionary import CaseError
+from ..case.scene import Family, Scene
+from ..case.share import WHOLE, Share, all_shares
+from ..case.times import STATE_FILE, fiber_state
+from ..coupling.message import NEEDS
+from ..fiber import Fibers, Stepper, merged_states
+from ..statistics.fibers import end_to_end_squared_ratio
+
+log = logging.getLogger(__name__)
+
+# prediction gap over the rms velocity at the beads: worth a word, and too much to go on with
+GAP_WARNING, GAP_LIMIT = 0.1, 1.0
+
+
+class Fleet:
+    """The fibers of a scene on their way through time.
+
+    Positions are (B, 3), B the beads of all families one after the other. The calls follow those of
+    `fiber.Stepper`.
+    """
+
+    def __init__(self, families: Sequence[Family], steppers: Sequence[Stepper], share: Share = WHOLE):
+        self.families = tuple(families)
+        self.share = share
+        self.steppers = tuple(steppers)
+        ends = np.cumsum([f.count * f.beads for f in families])
+        self._slices = [slice(e - f.count * f.beads, e) for e, f in zip(ends, families, strict=True)]
+        self.beads = int(ends[-1])
+        self._positions: np.ndarray | None = None
+
+    @classmethod
+    def seeded(cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE) -> Fleet:
+        """New fibers, at random places and orientations in the box unless the case gives their positions.
+
+        share: whose part of the families the scene has; their fibers are those that they are in the whole.
+        """
+        size = np.subtract(box_max, box_min)
+        steppers = []
+        for f in scene.families:
+            words = {"bending_torque": f.model.bending_torque, "curvature_law": f.model.curvature_law}
+            made_of = (f.bending_stiffness, scene.dynamic_viscosity)
+            positions = f.positions
+            if positions is None:
+                straight = Fibers.straight(f.total, f.beads, f.length, *made_of, box=size, seed=f.seed)
+                positions = straight.positions + box_min
+            try:
+                fibers = Fibers(positions, *made_of, **words).part(slice(f.first, f.first + f.count))
+            except ValueError as error:
+                raise CaseError(f"family {f.name} in constant/fiberProperties: {error}") from None
+            steppers.append(
+                Stepper(
+                    fibers,
+                    time=time,
+                    integrator=f.model.integrator,
+                    mobility=f.model.mobility,
+                    strain_coupling=f.model.strain_coupling,
+                    tolerance=f.model.tolerance,
+                    repulsion=f.model.repulsion,
+                )
+            )
+        return cls(scene.families, steppers, share)
+
+    @property
+    def time(self) -> float:
+        return self.steppers[0].time
+
+    @property
+    def need(self) -> str:
+        """What must be sampled for all families: "velocity", "rotation" or "gradient"."""
+        return max((s.need for s in self.steppers), key=NEEDS.index)
+
+    @property
+    def sizes(self) -> list[tuple[int, int, int]]:
+        """Fibers, beads of each, and number of the first fiber, of each family."""
+        return [(f.count, f.beads, f.first) for f in self.families]
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(B, 3), to be read only."""
+        if self._positions is None:
+            self._positions = np.concatenate([s.positions.reshape(-1, 3) for s in self.steppers])
+            self._positions.flags.writeable = False
+        return self._positions
+
+    @property
+    def by_family(self) -> list[np.ndarray]:
+        """Positions (count, beads, 3) of each family."""
+        parts = zip(self.families, self._slices, strict=True)
+        return [self.positions[part].reshape(f.count, f.beads, 3) for f, part in parts]
+
+    def observe(self, time: float, velocity: np.ndarray, extra: np.ndarray | None) -> None:
+        for family, stepper, part in zip(self.families, self.steppers, self._slices, strict=True):
+            shape = (family.count, family.beads)
+            stepper.observe(
+                time,
+                velocity[part].reshape(*shape, 3),
+                _ambient(stepper.need, extra, part, shape),
+            )
+
+    def advance(self, time_step: float) -> None:
+        self._positions = None
+        for s in self.steppers:
+            s.advance(time_step)
+
+    @property
+    def provisional(self) -> bool:
+        return any(s.provisional for s in self.steppers)
+
+    def correct(self) -> None:
+        self._positions = None
+        for s in self.steppers:
+            if s.provisional:
+                s.correct()
+
+    @property
+    def prediction_gap(self) -> float:
+        """Largest rms over a fiber of |predicted - received| ambient velocity [m/s]."""
+        return float(max(np.max(s.prediction_gap, initial=0.0) for s in self.steppers))
+
+    def check_prediction(self, velocity: np.ndarray, step: int) -> float:
+        """The prediction gap [m/s], compared to the rms of the sampled velocity (B, 3): it is an error that no
+        estimate inside the fibers sees. A word in the log where it is large, CaseError where it is of the flow's
+        order."""
+        rms = float(np.sqrt(3 * np.mean(velocity**2)))
+        gap = self.prediction_gap
+        if gap > GAP_LIMIT * rms > 0:
+            raise CaseError(
+                f"step {step}: the flow at a fiber was predicted with an error of {gap:g} m/s, more than its rms "
+                f"of {rms:g} m/s: the time step is too long for this flow"
+            )
+        if gap > GAP_WARNING * rms > 0:
+            share = 100 * gap / rms
+            log.warning(
+                "step %d: flow predicted with an error of %.0f %% of its rms: a shorter deltaT would be wise",
+                step,
+                share,
+            )
+        return gap
+
+    def end_to_end_ratio(self) -> list[float]:
+        """<R^2>/L^2 of each family, L = 2a(N - 1) between the end beads' centres."""
+        pairs = zip(self.families, self.by_family, strict=True)
+        return [float(end_to_end_squared_ratio(x, family.radius).mean()) for family, x in pairs]
+
+    def _signature(self) -> str:
+        return json.dumps([[f.name, f.total, f.beads, f.length] for f in self.families])
+
+    def save(self, folder: Path, step: int, time: float) -> None:
+        """Write the whole state into a time folder; the file appears only when it is complete. OSError names it."""
+        arrays = {
+            f"{family.name}/{key}": value
+            for family, stepper in zip(self.families, self.steppers, strict=True)
+            for key, value in stepper.state().items()
+        }
+        buffer = io.BytesIO()
+        np.savez(buffer, signature=self._signature(), step=step, time=time, **arrays)
+        path = folder / STATE_FILE
+        path = path.with_name(self.share.name(path.stem, path.suffix))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        try:
+            with part.open("wb") as file:
+                file.write(buffer.getbuffer())
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                part.unlink()
+            raise OSError(error.errno, error.strerror, str(path)) from None
+
+    def restore(self, folder: Path) -> None:
+        """Continue from the state in a time folder, whatever daemons shared it. ValueError where it is of other
+        fibers or unreadable."""
+        self._positions = None
+        paths = fiber_state(folder)
+        if not paths:
+            raise CaseError(f"{folder} holds no complete fiber state")
+        states = [self._read_state(path) for path in paths]
+        shares = all_shares(len(paths))
+        for family, stepper in zip(self.families, self.steppers, strict=True):
+            end = family.first + family.count
+            parts = [share.part(family.total) for share in shares]
+            # only the files that hold some of these fibers: a part of a family has its own sub-steps
+            held = [n for n, part in enumerate(parts) if part.start < end and family.first < part.stop]
+            own = [_of_family(states[n], family.name) for n in held]
+            offset = parts[held[0]].start
+            try:
+                stepper.restore(merged_states(own, slice(family.first - offset, end - offset)))
+            except (KeyError, ValueError) as error:
+                raise CaseError(f"the fiber state {paths[held[0]]} cannot be read: {error}") from None
+
+    def _read_state(self, path: Path) -> dict[str, np.ndarray]:
+        try:
+            with np.load(path) as data:
+                state = {key: data[key] for key in data.files}
+            signature = str(state["signature"])
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            raise CaseError(f"the fiber state {path} cannot be read: {error}") from None
+        if signature != self._signature():
+            raise CaseError(
+                f"{path} holds the families {signature} (name, count, beads, length), "
+                f"constant/fiberProperties says {self._signature()}: "
+                "restore the dictionary, or start afresh"
+            )
+        return state
+
+
+def _of_family(state: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    prefix = f"{name}/"
+    return {key.removeprefix(prefix): value for key, value in state.items() if key.startswith(prefix)}
+
+
+def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int, int]) -> np.ndarray | None:
+    """What one family needs, of what was sampled for all."""
+    if need == "velocity" or extra is None:
+        return None
+    extra = extra[part]
+    if need == "rotation" and extra.ndim == 3:
+        g = extra
+        curl = (g[:, 2, 1] - g[:, 1, 2], g[:, 0, 2] - g[:, 2, 0], g[:, 1, 0] - g[:, 0, 1])
+        extra = 0.5 * np.stack(curl, axis=-1)
+    return extra.reshape(*shape, *extra.shape[1:])

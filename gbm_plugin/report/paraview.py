@@ -1,0 +1,135 @@
+"""Fibers as a time series for ParaView: one .vtu per time with its own points, and a .pvd that lists them.
+
+XDMF is not used: meshio's reader, and so a check, knows neither a slice of an HDF5 dataset nor moving points.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..output.recording import Recording
+from ..statistics.fibers import curvature
+
+
+def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Path:
+    """Write all times of a recording as moving polylines of 2-node lines; returns the .pvd to open.
+
+    wrapped: every fiber cut at the faces of the periodic box and each piece shifted into it; otherwise fibers
+    are whole, where they were carried. Point data: family (its number), fiber, bead (indices in the family;
+    bead is fractional at a cut) and curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two
+    beads). Replaces a series that is there. Raises OSError if it cannot be written.
+    """
+    name = "wrapped" if wrapped else "unwrapped"
+    pieces = Path(folder) / name
+    pieces.mkdir(parents=True, exist_ok=True)
+    for old in pieces.glob("fibers_*.vtu"):
+        old.unlink()
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    for row, time in enumerate(recording.times):
+        file = pieces / f"fibers_{row:06d}.vtu"
+        polyline_mesh(recording, row, wrapped).write(file)
+        ElementTree.SubElement(
+            collection, "DataSet", timestep=f"{time:.12g}", part="0", file=f"{name}/{file.name}"
+        )
+    ElementTree.indent(root)
+    path = Path(folder) / f"fibers_{name}.pvd"
+    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    return path
+
+
+def polyline_mesh(recording: Recording, row: int, wrapped: bool) -> meshio.Mesh:
+    """All fibers at the `row`-th time as one mesh of lines, with the point data of write_series."""
+    points, lines, data, count = [], [], [], 0
+    for number, family in enumerate(recording.families.values()):
+        positions = family.positions[row]
+        fiber, bead = np.indices(positions.shape[:2], dtype=float)
+        values = np.stack(
+            [np.full_like(bead, number), fiber, bead, bead_curvature(positions, family.radius)], axis=-1
+        )
+        chains = np.concatenate([positions, values], axis=-1)
+        nodes, links = (
+            cut_at_faces(chains, recording.box_origin, recording.box_size) if wrapped else _whole(chains)
+        )
+        points.append(nodes[:, :3])
+        data.append(nodes[:, 3:])
+        lines.append(links + count)
+        count += len(nodes)
+    family, fiber, bead, kappa = np.concatenate(data).T.copy()
+    return meshio.Mesh(
+        np.concatenate(points),
+        [("line", np.concatenate(lines))],
+        point_data={
+            "family": family.astype(np.int32),
+            "fiber": fiber.astype(np.int32),
+            "bead": bead,
+            "curvature": kappa,
+        },
+    )
+
+
+def bead_curvature(positions: ArrayLike, radius: float) -> NDArray[np.float64]:
+    """Curvature of eq. (5) at every bead, (..., N) [1/m]: the end beads take their neighbours'."""
+    inner = curvature(positions, radius)
+    if inner.shape[-1] == 0:
+        return np.zeros(np.shape(positions)[:-1])
+    return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
+
+
+def _whole(chains: NDArray) -> tuple[NDArray, NDArray]:
+    count, beads, width = chains.shape
+    first = (np.arange(count)[:, None] * beads + np.arange(beads - 1)).ravel()
+    return chains.reshape(-1, width), np.stack([first, first + 1], axis=-1)
+
+
+def cut_at_faces(chains: NDArray, origin: ArrayLike, size: ArrayLike) -> tuple[NDArray, NDArray]:
+    """Cut chains at the faces of the periodic box and shift each piece into it.
+
+    chains (F, N, 3 + V): positions and V values along; origin, size (3,). A link that crosses a face is
+    divided there, with linearly interpolated values; both ends of the cut become points, one on either face.
+    Returns points (P, 3 + V) in the box and links (M, 2).
+    """
+    origin, size = np.asarray(origin, dtype=float), np.asarray(size, dtype=float)
+    beads = chains.shape[1]
+    scaled = (chains[..., :3] - origin) / size
+    start, end = scaled[:, :-1].reshape(-1, 3), scaled[:, 1:].reshape(-1, 3)
+    # cuts: link, and where in it, for every plane of the lattice that lies strictly between its ends
+    links, fractions = [np.empty(0, dtype=np.intp)], [np.empty(0)]
+    for axis in range(3):
+        low = np.minimum(start[:, axis], end[:, axis])
+        high = np.maximum(start[:, axis], end[:, axis])
+        plane = np.floor(low) + 1
+        while np.any(plane < high):
+            crossed = np.flatnonzero(plane < high)
+            links.append(crossed)
+            span = end[crossed, axis] - start[crossed, axis]
+            fractions.append((plane[crossed] - start[crossed, axis]) / span)
+            plane = plane + 1
+    link, fraction = np.concatenate(links), np.concatenate(fractions)
+    order = np.lexsort((fraction, link))
+    link, fraction = link[order], fraction[order]
+
+    # nodes along each chain: its beads and its cuts, by the coordinate bead + fraction
+    first = link // (beads - 1) * beads + link % (beads - 1)
+    flat = chains.reshape(-1, chains.shape[-1])
+    cut = flat[first] + fraction[:, None] * (flat[first + 1] - flat[first])
+    nodes = np.concatenate([flat, cut])
+    along = np.argsort(np.concatenate([np.arange(len(flat)), first + fraction]), kind="stable")
+    nodes = nodes[along]
+    fiber = np.concatenate([np.arange(len(flat)) // beads, first // beads])[along]
+    joined = np.flatnonzero(fiber[:-1] == fiber[1:])
+
+    # a segment lies in the cell of its middle; nodes are written once for each cell they are used in
+    middle = 0.5 * (nodes[joined, :3] + nodes[joined + 1, :3])
+    cell = np.floor((middle - origin) / size).astype(np.int64)
+    ends = np.stack([joined, joined + 1], axis=-1)
+    use = np.concatenate([ends.reshape(-1, 1), np.repeat(cell, 2, axis=0)], axis=1)
+    unique, inverse = np.unique(use, axis=0, return_inverse=True)
+    points = nodes[unique[:, 0]].copy()
+    points[:, :3] = np.clip(points[:, :3] - unique[:, 1:] * size, origin, origin + size)
+    return points, inverse.reshape(-1, 2)

@@ -1,0 +1,218 @@
+"""Fibers in their periodic box, seen in perspective."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, interp1d
+
+from ..output.recording import Recording
+from .paraview import bead_curvature, cut_at_faces
+from .style import new_figure
+
+# light (straight) to dark (bent); one hue per family, told apart by colour-blind readers too
+_HUES = (
+    ("#8fd0f5", "#0072B2", "#001c33"),
+    ("#ffd9a0", "#E0640A", "#4a1500"),
+    ("#a5ecd0", "#009E73", "#00291d"),
+    ("#f7c9e2", "#C4559A", "#3d0a2c"),
+    ("#e3e3e3", "#7a7a7a", "#101010"),
+    ("#fff3a6", "#d9b800", "#574600"),
+)
+_FLOW = LinearSegmentedColormap.from_list("flow", ["#ffffff", "#dfe3ea", "#aab2c3", "#7d879f"])
+_POINTS_PER_LINK = 6
+_MOST_FIBERS = 200  # more hide each other
+_THINNEST = 1.1  # points; thinner fibers are drawn this thick
+
+
+class Camera:
+    """Perspective projection of a box: scene (..., 3) to picture (..., 2) and nearness."""
+
+    def __init__(self, origin: NDArray, size: NDArray, elevation: float = 20, azimuth: float = -62) -> None:
+        e, a = np.radians([elevation, azimuth])
+        self.towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        self.right = np.array([-np.sin(a), np.cos(a), 0.0])
+        self.up = np.cross(self.towards, self.right)
+        self.centre = origin + size / 2
+        self.distance = 3.2 * np.linalg.norm(size)
+
+    def __call__(self, points: NDArray) -> tuple[NDArray, NDArray]:
+        offset = points - self.centre
+        near = offset @ self.towards
+        magnification = self.distance / (self.distance - near)
+        flat = np.stack([offset @ self.right, offset @ self.up], axis=-1)
+        return flat * magnification[..., None], near
+
+
+def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | None = None) -> Figure:
+    """Draw all families at the `row`-th time, wrapped into the box.
+
+    Fibers have their true thickness 2a where that is visible; colour is the curvature of eq. (5), a hue per
+    family. flow: values (nx, ny, nz) at the cell centres and their label, shown on the faces behind.
+    """
+    origin, size = recording.box_origin, recording.box_size
+    families = list(recording.families.values())[: len(_HUES)]
+    camera = Camera(origin, size)
+    figure = new_figure(8.2, 6.4)
+    grid = figure.add_gridspec(
+        len(families) + (flow is not None), 3, width_ratios=[1, 0.024, 0.13], wspace=0.02, hspace=0.06
+    )
+    axes = figure.add_subplot(grid[:, 0])
+    flat, _ = camera(origin + size * np.indices((2, 2, 2)).reshape(3, -1).T)
+    margin = 0.01 * np.ptp(flat, axis=0).max()
+    axes.set(xlim=(flat[:, 0].min() - margin, flat[:, 0].max() + margin))
+    axes.set(ylim=(flat[:, 1].min() - margin, flat[:, 1].max() + margin), aspect="equal")
+    axes.axis("off")
+
+    shapes, mappables, bars = [], [], []
+    for number, family in enumerate(families):
+        positions = family.positions[row]
+        shown = min(family.count, max(_MOST_FIBERS // len(families), 1))
+        kappa = bead_curvature(positions, family.radius)
+        colours = LinearSegmentedColormap.from_list(family.name, _HUES[number % len(_HUES)])
+        scale = Normalize(0, max(np.percentile(kappa, 98), 1e-3 / family.radius), clip=True)
+        mappables.append(ScalarMappable(scale, colours))
+        shapes.append((family.radius, positions[:shown], kappa[:shown]))
+        label = f"{family.name}\n{shown} of {family.count} fibers"
+        bars.append(_bar(figure, grid[number, 1], mappables[-1], label, extend="max"))
+    if flow is not None:
+        _bar(figure, grid[-1, 1], _draw_faces(axes, camera, origin, size, flow[0]), flow[1])
+    title = f"t = {recording.times[row]:g} s,  colour: curvature [1/m]"
+    if len(families) < len(recording.families):
+        title += f",  {len(families)} of {len(recording.families)} families"
+    axes.set_title(title, fontsize=10, color="0.25")
+
+    figure.draw_without_rendering()  # lays out the axes, which says how many points a metre has
+    figure.set_layout_engine("none")
+    points_per_metre = axes.transData.get_matrix()[0, 0] * 72 / figure.dpi
+    for (radius, _, _), bar in zip(shapes, bars, strict=True):
+        if 2 * radius * points_per_metre < _THINNEST:
+            bar.set_title(bar.get_title(loc="left") + "\n(drawn too thick)", fontsize=8, loc="left")
+    strokes = [
+        _strokes(camera, *shape, mappable, origin, size)
+        for shape, mappable in zip(shapes, mappables, strict=True)
+    ]
+    _draw_edges(axes, camera, origin, size, front=False)
+    _draw_strokes(axes, strokes, points_per_metre, size)
+    _draw_edges(axes, camera, origin, size, front=True)
+    return figure
+
+
+def _bar(figure: Figure, cell, mappable: ScalarMappable, label: str, extend: str = "neither") -> Axes:
+    bar = figure.colorbar(mappable, cax=figure.add_subplot(cell), extend=extend)
+    bar.ax.set_title(label, fontsize=8, loc="left")
+    bar.ax.tick_params(labelsize=8)
+    bar.ax.locator_params(nbins=5)
+    bar.outline.set_visible(False)
+    return bar.ax
+
+
+def _smooth(radius: float, positions: NDArray, kappa: NDArray) -> NDArray:
+    """Smooth curves through the beads with round ends: (F, P, 5), position, curvature, relative thickness."""
+    bead = np.arange(positions.shape[1], dtype=float)
+    fine = np.linspace(0, bead[-1], _POINTS_PER_LINK * (len(bead) - 1) + 1)
+    spline = CubicSpline(bead, positions, axis=1) if len(bead) > 2 else interp1d(bead, positions, axis=1)
+    curve = spline(fine)
+    values = interp1d(bead, kappa, axis=1)(fine)
+    x = np.sin(np.linspace(0, np.pi / 2, 6))[1:]  # the end beads' outer halves
+
+    def cap(end: NDArray, inner: NDArray, value: NDArray) -> NDArray:
+        tangent = (end - inner) / np.linalg.norm(end - inner, axis=-1, keepdims=True)
+        place = end[:, None] + radius * x[:, None] * tangent[:, None]
+        shape = (*place.shape[:2], 1)
+        thickness = np.broadcast_to(np.sqrt(1 - x**2)[:, None], shape)
+        return np.concatenate([place, np.broadcast_to(value[:, None, None], shape), thickness], axis=-1)
+
+    first = cap(curve[:, 0], curve[:, 1], values[:, 0])[:, ::-1]
+    last = cap(curve[:, -1], curve[:, -2], values[:, -1])
+    middle = np.concatenate([curve, values[..., None], np.ones_like(values)[..., None]], axis=-1)
+    return np.concatenate([first, middle, last], axis=1)
+
+
+def _strokes(
+    camera: Camera, radius: float, positions: NDArray, kappa: NDArray, colours: ScalarMappable, origin, size
+) -> tuple[NDArray, ...]:
+    """Short straight pieces of the fibers in the box: ends (M, 2, 2), nearness, width [m], taper, colour."""
+    points, lines = cut_at_faces(_smooth(radius, positions, kappa), origin, size)
+    flat, near = camera(points[:, :3])
+    near = near[lines].mean(axis=1)
+    value, taper = points[lines, 3:].mean(axis=1).T
+    width = 2 * radius * camera.distance / (camera.distance - near)
+    return flat[lines], near, width, taper, colours.to_rgba(value)[:, :3]
+
+
+def _draw_strokes(axes: Axes, strokes: list, points_per_metre: float, size: NDArray) -> None:
+    """From back to front: a dark rim, the body, a highlight; what is far fades."""
+    ends, near, width, taper, colour = (np.concatenate(part) for part in zip(*strokes, strict=True))
+    # equally near pieces keep their order along the fiber
+    order = np.argsort(np.round(near / np.linalg.norm(size), 6), kind="stable")
+    ends, near, colour = ends[order], near[order], colour[order]
+    width = (np.maximum(width * points_per_metre, _THINNEST) * taper)[order]
+    depth = np.clip(0.5 - near / np.linalg.norm(size), 0, 1)[:, None]
+    body = colour + 0.45 * depth * (0.97 - colour)
+    rim, light = 0.45 * body, body + 0.55 * (1 - body)
+    along = ends[:, 1] - ends[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
+    reach = 0.15 * (width / points_per_metre)[:, None] * along / length  # no gaps where pieces meet
+    longer = np.stack([ends[:, 0] - reach, ends[:, 1] + reach], axis=1)
+    shift = (width / points_per_metre)[:, None, None] * np.array([-0.13, 0.2])
+    axes.add_collection(
+        LineCollection(
+            np.stack([ends, longer, longer + shift], axis=1).reshape(-1, 2, 2),
+            linewidths=np.stack([width, np.maximum(width - 0.9, 0.7 * width), 0.3 * width], axis=1).ravel(),
+            colors=np.stack([rim, body, light], axis=1).reshape(-1, 3),
+            capstyle="butt",
+            rasterized=True,
+            zorder=3,
+        ),
+        autolim=False,
+    )
+
+
+def _draw_faces(axes: Axes, camera: Camera, origin: NDArray, size: NDArray, values: NDArray):
+    """The field on the three faces that look towards the camera from behind the fibers."""
+    nodes = values
+    for axis in range(3):  # from cell centres to nodes, periodically
+        nodes = 0.5 * (nodes + np.roll(nodes, 1, axis))
+        nodes = np.concatenate([nodes, np.take(nodes, [0], axis)], axis)
+    scale = Normalize(0, np.percentile(nodes, 99.5))
+    for axis in range(3):
+        side = 0 if camera.towards[axis] > 0 else -1
+        face = np.take(nodes, side, axis)
+        fraction = np.indices(face.shape) / (np.array(face.shape)[:, None, None] - 1)
+        place = np.insert(fraction, axis, 0.0 if side == 0 else 1.0, axis=0)
+        flat, _ = camera(origin + np.moveaxis(place, 0, -1) * size)
+        image = axes.pcolormesh(
+            flat[..., 0],
+            flat[..., 1],
+            face,
+            cmap=_FLOW,
+            norm=scale,
+            shading="gouraud",
+            rasterized=True,
+            zorder=1,
+        )
+    return image
+
+
+def _draw_edges(axes: Axes, camera: Camera, origin: NDArray, size: NDArray, front: bool) -> None:
+    """The box's edges: those that meet in the corner nearest to the camera, or the others."""
+    nearest = (camera.towards > 0).astype(int)
+    edges = []
+    for axis in range(3):
+        for corner in np.indices((2, 2, 2)).reshape(3, -1).T:
+            if corner[axis] == 0:
+                end = corner.copy()
+                end[axis] = 1
+                others = np.delete(np.arange(3), axis)
+                if np.array_equal(corner[others], nearest[others]) is front:
+                    edges.append(camera(origin + np.stack([corner, end]) * size)[0])
+    axes.add_collection(
+        LineCollection(edges, colors="0.35" if front else "0.55", linewidths=0.9, zorder=4 if front else 2),
+        autolim=False,
+    )

@@ -1,0 +1,175 @@
+"""Fibers and a flow that can be sampled in this process, step by step to the end of a run.
+
+What the flow is (`Carrier`), the driver does not know; results go to a folder in the case, which is laid out as
+an OpenFOAM case itself, so that `gbm report` and ParaView read it like one.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..case.dictionary import CaseError
+from ..case.initial import write_velocity
+from ..case.scene import Scene
+from ..case.times import STATE_FILE, Start
+from ..coupling.daemon import family_record
+from ..fleet.fleet import Fleet
+from ..fleet.steptable import StepTable
+from ..output.recording import Recorder
+from ..output.restarts import keep_earlier
+from .progress import Progress
+
+log = logging.getLogger(__name__)
+
+
+class Carrier:
+    """A flow on its way through time beside the fibers. All but `sample` and `on_cells` may be left as they are."""
+
+    def sample(self, positions: np.ndarray, time: float, need: str):
+        """As in gbm_plugin.flow, at the present time of the run."""
+        raise NotImplementedError
+
+    def on_cells(self, time: float) -> np.ndarray:
+        """Velocity (3, nx, ny, nz) [m/s] at the centres of the case's cells."""
+        raise NotImplementedError
+
+    def open(self, name: str) -> None:
+        """The tables of a run that starts at the time of this name."""
+
+    def advance(self) -> None:
+        """One time step."""
+
+    def note(self, time: float) -> None:
+        """The row of a time."""
+
+    def save(self, folder: Path) -> None:
+        """What a restart needs, into a time folder."""
+
+    def restore(self, folder: Path) -> None:
+        """Continue from what save wrote. CaseError where it is not of this flow."""
+
+    def close(self) -> None:
+        """The tables."""
+
+
+def results_folder(case: Path, name: str) -> Path:
+    """The folder `name` of the case, with the case's constant and system."""
+    folder = case / name
+    try:
+        folder.mkdir(exist_ok=True)
+        for part in ("constant", "system"):
+            if not (folder / part).exists():
+                os.symlink(Path("..") / part, folder / part)
+    except OSError as error:
+        raise CaseError(f"cannot write in {folder}: {error.strerror}") from None
+    return folder
+
+
+class Run:
+    """`scene.case` is the folder of the results."""
+
+    def __init__(self, scene: Scene, carrier: Carrier, start: Start):
+        self.scene, self.carrier, self.start = scene, carrier, start
+        folders = [scene.case.parent / name for name in ("0.orig", "0")]
+        self.template = next((f / "U" for f in folders if (f / "U").is_file()), None)
+        if self.template is None:
+            raise CaseError(
+                f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written"
+            )
+        self.fleet = Fleet.seeded(scene, scene.origin, np.add(scene.origin, scene.box), start.time)
+        if start.continues:
+            folder = scene.case / _name(start.time)
+            carrier.restore(folder)
+            self.fleet.restore(folder)
+            log.info("flow and fibers continue from %s", folder / STATE_FILE)
+        self._open_outputs(_name(start.time))
+
+    def _open_outputs(self, name: str) -> None:
+        scene = self.scene
+        fibers = scene.case / "postProcessing/fibers" / name
+        self.recorder = Recorder(
+            keep_earlier(fibers / "fibers.h5"),
+            [family_record(f) for f in scene.families],
+            box_origin=scene.origin,
+            box_size=scene.box,
+            viscosity=scene.dynamic_viscosity,
+            density=scene.density,
+            dictionaries=scene.texts,
+            program_version=__version__,
+        )
+        self.table = StepTable(fibers, scene.families)
+        self.carrier.open(name)
+
+    def to_the_end(self) -> bool:
+        """Up to scene.end_time; False where a signal stopped it before, after the step under way."""
+        stop: list[int] = []
+        handlers = {n: signal.signal(n, lambda *_: stop.append(1)) for n in (signal.SIGINT, signal.SIGTERM)}
+        scene = self.scene
+        every = scene.write_interval / scene.time_step
+        every = round(every) if math.isfinite(every) else 0
+        self.step = round(self.start.time / scene.time_step)
+        last = self.step + round((scene.end_time - self.start.time) / scene.time_step)
+        try:
+            with Progress(scene, self.start.time) as progress:
+                self._observe()
+                self._note()
+                while self.step < last:
+                    self._advance()
+                    stopping = bool(stop) and self.step < last
+                    if stopping or self.step == last or (every and self.step % every == 0):
+                        self._save()
+                    if self.step % 10 == 0:
+                        progress.update()
+                    if stopping:
+                        return False
+        finally:
+            self.recorder.close()
+            self.table.close()
+            self.carrier.close()
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+        return True
+
+    def _observe(self) -> None:
+        fleet = self.fleet
+        velocity, extra = self.carrier.sample(fleet.positions, fleet.time, fleet.need)
+        fleet.observe(fleet.time, velocity, extra)
+        if not fleet.provisional:
+            self.gap = fleet.check_prediction(velocity, self.step)
+
+    def _advance(self) -> None:
+        self.step += 1
+        self.carrier.advance()
+        self.fleet.advance(self.scene.time_step)
+        while self.fleet.provisional:
+            self._observe()
+            self.fleet.correct()
+        self._observe()
+        self._note()
+
+    def _note(self) -> None:
+        """The tables' rows of this time, and the record if it is due."""
+        fleet = self.fleet
+        self.carrier.note(fleet.time)
+        self.table.add(fleet.time, self.step, 0.0, 0.0, self.gap, fleet.end_to_end_ratio())
+        if self.step % self.scene.record_interval == 0:
+            self.recorder.append(self.step, fleet.time, fleet.by_family)
+
+    def _save(self) -> None:
+        """U at the cell centres for whoever reads the folder as a case, then the states, complete with the last."""
+        time = self.fleet.time
+        folder = self.scene.case / _name(time)
+        write_velocity(self.template, folder / "U", self.carrier.on_cells(time))
+        self.carrier.save(folder)
+        self.fleet.save(folder, self.step, time)
+
+
+def _name(time: float) -> str:
+    return f"{time:.8g}"

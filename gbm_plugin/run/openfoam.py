@@ -1,0 +1,258 @@
+"""One scene brought together: the case prepared, solver and daemon started, watched and ended."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..case.dictionary import CaseError
+from ..case.lock import DAEMON, RUN, locked
+from ..case.log import summary
+from ..case.openfoam import command, environment, fatal_message
+from ..case.prepare import prepare, ranks_of, reconstruct
+from ..case.scene import Scene, read_scene
+from ..case.share import Share, all_shares
+from ..case.times import choose_start
+from ..output.restarts import keep_earlier
+from .progress import Progress
+
+log = logging.getLogger(__name__)
+
+STOPPED = "stopped on request; everything is written: the same command continues"
+GRACE = 5.0  # how long one side may outlive the other that failed, before it is ended [s]
+FULL = 1 << 20  # a disk with less room may be why OpenFOAM failed [bytes]
+
+
+class RunError(RuntimeError):
+    """A run that did not reach its end: names the cause, the side that failed and its log."""
+
+
+def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> None:
+    """Run a case with OpenFOAM and the fiber daemon to its endTime, continuing an unfinished run.
+
+    parallel: on the ranks of system/decomposeParDict; fresh: from the beginning, earlier results set aside.
+    Raises CaseError for a mistake in the case, RunError where a process fails.
+    """
+    case = Path(case).resolve()
+    scene = read_scene(case)
+    if scene.forcing is not None and scene.forcing.type == "eswaranPope":
+        raise CaseError(
+            f"{case}/constant/fvOptions: eswaranPope is a forcing of the spectral solver; OpenFOAM has "
+            "linearForcing (gbm run --flow spectral runs this case)"
+        )
+    ranks = ranks_of(case, parallel)
+    with _only_run(case) as lock:
+        start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)
+        prepare(scene, start, ranks)
+        _remove_addresses(case)
+        _Processes(scene, ranks, start.time, lock).run()
+        if ranks > 1:
+            reconstruct(case)
+
+
+def run_spectral(case: Path | str, **options) -> None:
+    """Run a case in the pseudo-spectral solver; options as those of `spectral_run.run_spectral`."""
+    from .spectral import run_spectral
+
+    _run_here(case, run_spectral, options)
+
+
+def run_stored(case: Path | str, **options) -> None:
+    """Move the fibers of a case through stored fields; options as those of `replay.run_stored`."""
+    from .stored import run_stored
+
+    _run_here(case, run_stored, options)
+
+
+def _run_here(case: Path | str, engine: Callable[..., bool], options: dict) -> None:
+    case = Path(case).resolve()
+    with _only_run(case):
+        if not engine(read_scene(case), **options):
+            raise RunError(STOPPED)
+
+
+@contextmanager
+def _only_run(case: Path) -> Iterator[int]:
+    """Two runs never write into one case, nor one beside a daemon that was started by hand. Yields the lock,
+    which solver and daemon hold too: should this process be killed, the next run is refused until they have ended."""
+    with locked(case, RUN) as lock:
+        for file in case.glob(f".gbm.{DAEMON}*.lock"):
+            with locked(case, file.name.removeprefix(".gbm.").removesuffix(".lock")):
+                pass
+        yield lock
+
+
+def _remove_addresses(case: Path) -> None:
+    """Addresses that killed daemons left."""
+    for pattern in ("gbm*.tcp", "exchange*/session"):
+        for path in case.glob(pattern):
+            path.unlink()
+
+
+class _Daemon:
+    """One daemon of a run: its process and its log."""
+
+    def __init__(self, case: Path, share: Share):
+        self.share = share
+        self.log = case / share.name("log.gbmDaemon")
+        # -P: not a folder gbm_plugin that happens to be here
+        self.argv = [sys.executable, "-P", "-m", "gbm_plugin.cli", "daemon", str(case)]
+        if share.of > 1:
+            self.argv += ["--share", str(share.number)]
+        self.process: subprocess.Popen | None = None
+        self._asked = False
+
+    def ask_to_stop(self) -> None:
+        """Once: the daemon then asks OpenFOAM to write and end, and a second signal would end it at once."""
+        if self.process is not None and not self._asked:
+            self._asked = True
+            self.process.terminate()
+
+
+class _Processes:
+    """The solver and the daemons of a run."""
+
+    def __init__(self, scene: Scene, ranks: int, start_time: float, lock: int):
+        self.scene = scene
+        self.case = scene.case
+        self.ranks = ranks
+        self.start_time = start_time
+        self.daemons = [_Daemon(self.case, share) for share in all_shares(scene.coupling.daemons)]
+        self.solver_log = self.case / f"log.{scene.application}"
+        self.lock = lock
+        self.solver: subprocess.Popen | None = None
+        self.stopping = 0
+        self.ended_here: set[subprocess.Popen] = set()  # by this process, after another one's end
+
+    def run(self) -> None:
+        # in sessions of their own: Ctrl-C reaches this process alone, which then ends all in order
+        solver = command(self.scene.application, self.case, self.ranks)
+        handlers = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
+        # the cores that the solver leaves; one that they share, if it leaves none
+        cores = max(1, (len(os.sched_getaffinity(0)) - self.ranks) // len(self.daemons))
+        try:
+            for daemon in self.daemons:
+                daemon.process = self._start(daemon.argv, daemon.log, NUMBA_NUM_THREADS=str(cores))
+                if self.stopping:  # before there was a daemon to tell
+                    daemon.ask_to_stop()
+            self.solver = self._start(solver, self.solver_log)
+            self._watch()
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+            for process in filter(None, (self.solver, *(d.process for d in self.daemons))):
+                self._end(process)
+        self._judge()
+
+    def _start(self, argv: list[str], log_file: Path, **variables: str) -> subprocess.Popen:
+        keep_earlier(log_file)
+        with log_file.open("w") as output:
+            return subprocess.Popen(
+                argv,
+                env=environment() | variables,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                pass_fds=(self.lock,),
+            )
+
+    def _end(self, process: subprocess.Popen) -> None:
+        """The process and all that it started are gone when this returns."""
+        if process.poll() is None:
+            self.ended_here.add(process)
+            process.terminate()
+            try:
+                process.wait(3)
+            except subprocess.TimeoutExpired:  # it hangs, or was stopped
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+    def _stop(self, *_) -> None:
+        self.stopping += 1
+        if self.stopping == 1:
+            log.info("stopping: the flow is written after the step under way (once more: at once)")
+            for daemon in self.daemons:
+                daemon.ask_to_stop()
+        elif self.solver is not None:
+            self.solver.terminate()
+
+    def _watch(self) -> None:
+        """Until all have ended, or one has outlived another for too long."""
+        everyone = [self.solver, *(d.process for d in self.daemons)]
+        alone_since = None
+        with Progress(self.scene, self.start_time) as progress:
+            while any(process.poll() is None for process in everyone):
+                time.sleep(0.1)
+                progress.update()
+                if all(process.poll() is None for process in everyone):
+                    continue
+                if alone_since is None:
+                    alone_since = time.monotonic()
+                    failed = any(process.poll() for process in everyone)
+                    grace = GRACE if failed else self.scene.coupling.timeout
+                    if failed:
+                        self._dismiss()
+                elif time.monotonic() - alone_since > grace:
+                    break
+            progress.update()
+
+    def _dismiss(self) -> None:
+        """End at once who would only wait for a partner that does not come."""
+        if self.solver.poll():
+            left = [d.process for d in self.daemons if d.process.poll() is None]
+        else:
+            left = [self.solver] if self.stopping and self.solver.poll() is None else []
+        for process in left:  # a daemon in a session is merely asked for the end
+            self.ended_here.add(process)
+            process.terminate()
+
+    def _judge(self) -> None:
+        solver = self.solver.returncode
+        problem = fatal_message(self.solver_log)
+        if not any((solver, *(d.process.returncode for d in self.daemons))):
+            if self.stopping:
+                raise RunError(STOPPED)
+            log.info("%s: %s", self.scene.application, summary(self.solver_log))
+            return
+        if self.stopping and not problem:
+            raise RunError("stopped at once; the same command continues from the latest time that is written")
+        name = self.scene.application
+        causes = []
+        # one that was ended here is not the cause
+        if solver < 0 and not problem and self.solver not in self.ended_here:
+            causes.append(f"{name} was ended by {signal.Signals(-solver).name} ({self.solver_log})")
+        for d in self.daemons:
+            if d.process.returncode < 0 and d.process not in self.ended_here:
+                ended_by = signal.Signals(-d.process.returncode).name
+                causes.append(f"{d.share} was ended by {ended_by} ({d.log})")
+        errors = [(error, d.log) for d in self.daemons if (error := _last_error(d.log))]
+        # where the solver repeats what one of them said, the others only lost the solver
+        errors = [(error, file) for error, file in errors if problem and error in problem] or errors
+        if not problem or "the daemon stopped:" in problem:
+            causes += [f"{error} ({file})" for error, file in errors]
+        if problem and not (errors and "the daemon stopped:" in problem):
+            causes.append(f"{name}: {problem} ({self.solver_log})")
+        if not causes:
+            codes = [f"{name} ended with exit code {solver}"]
+            codes += [f"{d.share} with {d.process.returncode}" for d in self.daemons]
+            logs = [str(self.solver_log), *(str(d.log) for d in self.daemons)]
+            causes.append(f"{', '.join(codes)} ({', '.join(logs)})")
+        if shutil.disk_usage(self.case).free < FULL:
+            causes.append(f"the disk of {self.case} is full")
+        raise RunError("; ".join(causes))
+
+
+def _last_error(path: Path) -> str | None:
+    lines = [
+        line for line in path.read_text(errors="replace").splitlines() if line.startswith("gbm daemon: ")
+    ]
+    return lines[-1].removeprefix("gbm daemon: ") if lines else None

@@ -1,0 +1,149 @@
+"""`gbm run CASE --flow spectral`: the case's physics in the pseudo-spectral solver, with the case's fibers.
+
+Results go to the folder `spectral` in the case, which is laid out as an OpenFOAM case itself, so that
+`gbm report CASE/spectral` and ParaView read it like the other engine's.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..case.dictionary import CaseError
+from ..case.initial import read_initial_field
+from ..case.scene import Forcing, Scene
+from ..case.times import choose_start
+from ..output.restarts import keep_earlier
+from ..spectral import EswaranPope, LinearForcing, SpectralSolver
+from ..spectral.interpolation import WORDS
+from .driver import Carrier, Run, results_folder
+
+FLOW_FILE = "uniform/flow.npz"
+COLUMNS = (
+    *("Time", "k", "epsilonBudget", "epsilonGradient", "epsilonLaplacian", "uPrime", "ReLambda", "eta"),
+    *("A", "power", "meanUx", "meanUy", "meanUz"),
+)
+
+
+def run_spectral(
+    scene: Scene, *, fresh: bool = False, threads: int = 1, precision: str = "double", device: str = "cpu"
+) -> bool:
+    """Run to the case's endTime, continuing an unfinished run; False where a signal stopped it before.
+
+    Raises CaseError for what this engine cannot do, FloatingPointError where the flow or a fiber is not finite.
+    """
+    cells, box = _cube(scene)
+    if scene.interpolation not in WORDS:
+        raise CaseError(
+            f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of the "
+            f"spectral solver's; allowed: {' '.join(WORDS)}"
+        )
+    folder = results_folder(scene.case, "spectral")
+    start = choose_start(folder, scene.start_time, scene.end_time, scene.time_step, fresh)
+    solver = SpectralSolver(
+        cells,
+        scene.viscosity,
+        box=box,
+        forcing=_forcing(scene.forcing),
+        time_step=scene.time_step,
+        threads=threads,
+        precision=precision,
+        interpolation=scene.interpolation,
+        device=device,
+    )
+    if not start.continues:
+        _set_initial(scene, solver)
+    scene = replace(scene, case=folder)
+    return Run(scene, _SpectralFlow(scene, solver), start).to_the_end()
+
+
+def _set_initial(scene: Scene, solver: SpectralSolver) -> None:
+    modes = read_initial_field(scene.case)
+    try:
+        solver.set_velocity(modes.on_lattice(scene.cells, offset=0.0))
+    except ValueError as error:
+        raise CaseError(f"{scene.case}/system/initialFieldDict: {error}") from None
+
+
+def _cube(scene: Scene) -> tuple[int, float]:
+    if scene.box is None or scene.cells is None:
+        raise CaseError(f"{scene.case}/system/blockMeshDict: the spectral solver needs one uniform block")
+    if np.ptp(scene.box) > 1e-9 * scene.box[0] or len(set(scene.cells)) > 1 or scene.cells[0] % 2:
+        raise CaseError(
+            f"{scene.case}/system/blockMeshDict: the spectral solver needs a cube with the same even number of "
+            f"cells in each direction, not {scene.cells} in a box of {tuple(f'{b:g}' for b in scene.box)}"
+        )
+    return scene.cells[0], scene.box[0]
+
+
+def _forcing(forcing: Forcing | None) -> LinearForcing | EswaranPope | None:
+    if forcing is None:
+        return None
+    v = forcing.values
+    if forcing.type == "eswaranPope":
+        return EswaranPope(
+            variance=v["variance"], time_scale=v["timeScale"], cutoff=v["cutoff"], seed=v["seed"]
+        )
+    strength = {"coefficient": v["A"]} if v["mode"] == "constantCoefficient" else {"power": v["power"]}
+    return LinearForcing(**strength) if all(strength.values()) else None
+
+
+class _SpectralFlow(Carrier):
+    """The solver, and its table of energies."""
+
+    def __init__(self, scene: Scene, solver: SpectralSolver):
+        self.scene, self.solver = scene, solver
+        # energy and power before the last step, and at its end
+        self.before: tuple[float, float] | None = None
+        self.now: tuple[float, float] | None = None
+
+    def sample(self, positions: np.ndarray, time: float, need: str):
+        return self.solver.sample(positions - np.asarray(self.scene.origin), self.solver.time, need)
+
+    def on_cells(self, time: float) -> np.ndarray:
+        return self.solver.shifted_velocity(0.5)
+
+    def open(self, name: str) -> None:
+        path = self.scene.case / "postProcessing/linearForcing" / name / "linearForcing.dat"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.table = keep_earlier(path).open("w", buffering=1)
+        self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")
+
+    def advance(self) -> None:
+        self.solver.advance(1)
+
+    def note(self, time: float) -> None:
+        energy, power, dissipation = self.solver.energetics().values()
+        balance = dissipation
+        self.before, self.now = self.now, (energy, power)
+        if self.before is not None:
+            balance = 0.5 * (power + self.before[1]) - (energy - self.before[0]) / self.scene.time_step
+        nu, u = self.scene.viscosity, math.sqrt(2 * energy / 3)
+        reynolds = u**2 * math.sqrt(15 / (nu * dissipation)) if dissipation > 0 else 0.0
+        eta = (nu**3 / dissipation) ** 0.25 if dissipation > 0 else math.inf
+        coefficient = power / (2 * energy) if energy > 0 else 0.0
+        mean = self.solver.coefficients[:, 0, 0, 0].real
+        row = (time, energy, balance, dissipation, dissipation, u, reynolds, eta, coefficient, power, *mean)
+        self.table.write("\t".join(f"{x:.12g}" for x in row) + "\n")
+
+    def save(self, folder: Path) -> None:
+        path = folder / FLOW_FILE
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb") as file:
+            np.savez(file, before=self.before, **self.solver.state())
+
+    def restore(self, folder: Path) -> None:
+        path = folder / FLOW_FILE
+        try:
+            with np.load(path) as data:
+                state = {name: data[name] for name in data.files}
+        except (OSError, ValueError) as error:
+            raise CaseError(f"the state of the flow {path} cannot be read: {error}") from None
+        self.now = tuple(state.pop("before"))  # the row of this time is made again
+        self.solver.restore(state)
+
+    def close(self) -> None:
+        self.table.close()

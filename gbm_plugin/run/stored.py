@@ -1,0 +1,151 @@
+"""`gbm run CASE --flow stored`: a case's fibers in velocity fields that are there already.
+
+The fields are those of the case's own time folders, or of an HDF5 file of another code (`flow.hdf5`). Results go
+to the folder `stored` in the case, laid out as a case itself.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..case.dictionary import CaseError
+from ..case.scene import Scene
+from ..case.times import choose_start
+from ..flow import StoredFlow, hdf5_flow
+from ..flow.grid import WORDS
+from ..flow.stored import SAME_TIME, refuse_gaps
+from ..output.field import box_mesh
+from ..output.stored import case_flow
+from .driver import Carrier, Run, results_folder
+
+log = logging.getLogger(__name__)
+
+SOURCE_FILE = "uniform/stored.json"
+
+
+def run_stored(
+    scene: Scene,
+    *,
+    fresh: bool = False,
+    fields: Path | str | None = None,
+    in_time: str = "cubic",
+    every: int = 1,
+) -> bool:
+    """Move the fibers from startTime to endTime as far as the fields reach, continuing an unfinished replay;
+    False where a signal stopped it before.
+
+    fields: an HDF5 file; None: the case's time folders, every so many of them. in_time: "cubic" or "linear".
+    Raises CaseError or ValueError for what cannot be replayed, FloatingPointError where a field or a fiber is
+    not finite.
+    """
+    if scene.cells is None:
+        raise CaseError(f"{scene.case}/system/blockMeshDict: a replay needs one uniform block")
+    if scene.interpolation not in WORDS:
+        raise CaseError(
+            f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of those "
+            f"for stored fields; allowed: {' '.join(WORDS)}"
+        )
+    if fields is None:
+        scene = _on_its_mesh(scene)
+        where = (scene.cells, scene.box, scene.origin)
+        flow = case_flow(scene.case, *where, scene.interpolation, in_time, every)
+    else:
+        flow = hdf5_flow(fields, scene.interpolation, in_time)
+        if not np.allclose(flow.box, scene.box, rtol=1e-6, atol=0):
+            raise CaseError(
+                f"{fields}: box is {_listed(flow.box)}, that of {scene.case}/system/blockMeshDict is "
+                f"{_listed(scene.box)}: they must be the same"
+            )
+    begin, end = _range(scene, flow)
+    folder = results_folder(scene.case, "stored")
+    start = choose_start(folder, begin, end, scene.time_step, fresh)
+    source = {
+        "fields": str(Path(fields).resolve()) if fields else "time folders",
+        "every": every,
+        "interpolation": scene.interpolation,
+        "inTime": in_time,
+    }
+    carrier = _Stored(flow, scene, source)
+    return Run(replace(scene, case=folder, end_time=end), carrier, start).to_the_end()
+
+
+def _on_its_mesh(scene: Scene) -> Scene:
+    """The box to the digits of the mesh, as the fibers of a live run have it."""
+    try:
+        cells, origin, size = box_mesh(scene.case)
+    except FileNotFoundError:  # the fields alone were kept
+        return scene
+    if cells != scene.cells:
+        raise CaseError(
+            f"the mesh {scene.case}/constant/polyMesh has {cells} cells, system/blockMeshDict says {scene.cells}"
+        )
+    return replace(scene, origin=tuple(origin.tolist()), box=tuple(size.tolist()))
+
+
+def _range(scene: Scene, flow: StoredFlow) -> tuple[float, float]:
+    """First and last time of the replay: the case's, as far as the fields reach."""
+    first, last, step = flow.times[0], flow.times[-1], scene.time_step
+    slack = SAME_TIME * step
+    begin, end = scene.start_time, scene.end_time
+    if begin < first - slack:
+        log.info("startTime is %g; the fields begin at %g, and so does the replay", begin, first)
+        begin = float(first)
+    steps = round((end - begin) / step)
+    if begin + steps * step > last + slack:
+        steps = int(np.floor((last - begin + slack) / step))
+        log.info("endTime is %g; the fields end at %g, the replay at %g", end, last, begin + steps * step)
+    if steps < 1:
+        raise CaseError(
+            f"{scene.case}/system/controlDict: from startTime {scene.start_time:g} to endTime "
+            f"{scene.end_time:g} there is no step of {step:g} within the fields, {first:.9g} to {last:.9g}"
+        )
+    end = begin + steps * step
+    refuse_gaps(flow.times, begin, end)
+    return begin, end
+
+
+class _Stored(Carrier):
+    """The fields, and what a continued replay must have in common with its beginning."""
+
+    def __init__(self, flow: StoredFlow, scene: Scene, source: dict):
+        self.flow, self.scene, self.source = flow, scene, source
+
+    def sample(self, positions: np.ndarray, time: float, need: str):
+        return self.flow.sample(positions, time, need)
+
+    def on_cells(self, time: float) -> np.ndarray:
+        nx, ny, nz = self.scene.cells
+        plane = np.stack(np.meshgrid(0.5, np.arange(ny) + 0.5, np.arange(nz) + 0.5, indexing="ij"), axis=-1)
+        planes = (
+            plane + np.array([i, 0, 0]) for i in range(nx)
+        )  # one by one: places take as much memory as fields
+        width = np.divide(self.scene.box, self.scene.cells)
+        parts = [self.flow.sample(self.scene.origin + p * width, time, "velocity")[0] for p in planes]
+        return np.moveaxis(np.concatenate(parts), -1, 0)
+
+    def save(self, folder: Path) -> None:
+        path = folder / SOURCE_FILE
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(self.source, indent=2) + "\n")
+
+    def restore(self, folder: Path) -> None:
+        path = folder / SOURCE_FILE
+        try:
+            earlier = json.loads(path.read_text())
+        except (OSError, ValueError) as error:
+            raise CaseError(f"{path} cannot be read: {error}") from None
+        for name, value in self.source.items():
+            if earlier.get(name) != value:
+                raise CaseError(
+                    f"{path}: the replay began with {name} '{earlier.get(name)}', this one has '{value}': "
+                    "use the same, or --fresh to start anew"
+                )
+
+
+def _listed(values) -> str:
+    return "(" + " ".join(f"{v:.9g}" for v in values) + ")"

@@ -1,0 +1,98 @@
+"""What the coupling costs a step of OpenFOAM: waiting for daemons, finding beads, sampling, sending."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from ...case.copies import copy_case
+from ...case.scene import read_scene
+from ...case.share import all_shares
+from ...output.tables import read_dat
+from ...run.openfoam import run as run_case
+
+FIBERS = """coupling {{ transport {transport}; daemons {daemons}; }}
+recordInterval {never};
+interpolation {interpolation};
+families {{ bench {{ count {fibers}; beads {beads}; length {length}; bendingStiffness 1e-5; seed 1; }} }}
+"""
+SLABS = """numberOfSubdomains {ranks};
+method simple;
+simpleCoeffs {{ n (1 1 {ranks}); delta 0.001; }}
+"""
+PARTS = ("wait", "location", "sampling", "sending")  # columns of coupling.dat
+START = 5  # the first steps are corrected, and compile
+
+
+def run(
+    case: Path | str,
+    cells: int = 64,
+    fibers: int = 1000,
+    beads: int = 20,
+    steps: int = 30,
+    transport: str = "socket",
+    ranks: int = 1,
+    daemons: int = 1,
+) -> dict:
+    """Median seconds a step, of a copy of `case` with this many cells in each direction and one family.
+
+    "daemon" is the time from a sample's arrival at the slowest daemon to its next positions, which a step of the flow
+    hides as long as it is longer. Raises CaseError and RunError as `run.run`.
+    """
+    case = Path(case)
+    word = read_scene(case).interpolation
+    with tempfile.TemporaryDirectory(prefix="gbm-bench-") as folder:
+        copy = Path(folder) / "case"
+        entries = {
+            "system/controlDict": {"deltaT": 0.005, "endTime": 0.005 * steps, "writeInterval": 10 * steps},
+            "system/blockMeshDict": {"n": cells},
+        }
+        sizes = {"fibers": fibers, "beads": beads, "length": 0.1 * beads, "never": 10 * steps}
+        texts = {
+            "constant/fiberProperties": FIBERS.format(
+                transport=transport, daemons=daemons, interpolation=word, **sizes
+            ),
+            "system/decomposeParDict": SLABS.format(ranks=ranks),
+        }
+        copy_case(case, copy, entries, texts)
+        run_case(copy, parallel=ranks > 1)
+        results = copy / "postProcessing/fibers"
+        table = read_dat(results, "coupling.dat")
+        of_daemons = [read_dat(results, share.name("daemon", ".dat")) for share in all_shares(daemons)]
+    parts = {name: float(np.median(table[name][START:])) for name in PARTS}
+    step = float(np.median(np.diff(table["sentAt"])[START:]))
+    busy = [np.median((d["sentAt"][1:] - d["arrivedAt"][:-1])[START:]) for d in of_daemons]
+    return {
+        "cells": cells,
+        "fibers": fibers,
+        "beads": beads,
+        "transport": transport,
+        "interpolation": word,
+        "ranks": ranks,
+        "daemons": daemons,
+        "step": step,
+        **parts,
+        "share": sum(parts.values()) / step,
+        "daemon": float(max(busy)),
+        "positions_bytes": 24 * fibers * beads,
+        "sample_bytes": 48 * fibers * beads,
+    }
+
+
+def table(result: dict) -> str:
+    """The result of `run` as text."""
+    lines = [
+        f"{result['cells']}^3 cells, {result['fibers']} fibers x {result['beads']} beads, "
+        f"{result['interpolation']}, {result['transport']}, "
+        f"{result['ranks']} rank(s), {result['daemons']} daemon(s): step {1e3 * result['step']:.1f} ms"
+    ]
+    for name in PARTS:
+        seconds = result[name]
+        lines.append(f"    {name:<16}{1e3 * seconds:8.2f} ms {seconds / result['step']:8.1%}")
+    lines.append(
+        f"    {'coupling':<16}{1e3 * result['step'] * result['share']:8.2f} ms {result['share']:8.1%}"
+    )
+    lines.append(f"    beside it, the slowest daemon is busy for {1e3 * result['daemon']:.2f} ms")
+    return "\n".join(lines)

@@ -1,0 +1,60 @@
+"""The driver of flows that are sampled in this process, with flows made for the purpose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gbm_plugin.case.dictionary import CaseError
+from gbm_plugin.case.scene import read_scene
+from gbm_plugin.case.times import Start
+from gbm_plugin.run.driver import Carrier, Run, results_folder
+
+from conftest import make_case
+
+STEP = 0.02
+
+
+class Wind(Carrier):
+    """A uniform velocity along x that is `after` from some step on, and 1 before."""
+
+    def __init__(self, step, after):
+        self.step, self.after = step, after
+
+    def sample(self, positions, time, need):
+        velocity = np.zeros(positions.shape)
+        velocity[:, 0] = self.after if time > (self.step - 0.5) * STEP else 1.0
+        return velocity, np.zeros(positions.shape)
+
+    def on_cells(self, time):
+        return np.zeros((3, 16, 16, 16))
+
+
+def run(tmp_path, wind):
+    scene = read_scene(make_case(tmp_path / "case", steps=10, time_step=STEP, prepared=False))
+    folder = results_folder(scene.case, "wind")
+    return Run(replace(scene, case=folder), wind, Start(0.0, False))
+
+
+def test_fibers_go_with_a_uniform_wind(tmp_path):
+    drive = run(tmp_path, Wind(99, 1.0))
+    before = drive.fleet.positions
+    assert drive.to_the_end()
+    np.testing.assert_allclose(
+        drive.fleet.positions - before, np.tile([10 * STEP, 0, 0], (len(before), 1)), atol=1e-13
+    )
+    assert (tmp_path / "case/wind/0.2/uniform/fibers.npz").is_file()
+
+
+def test_a_flow_that_jumps_is_refused_at_its_step(tmp_path):
+    with pytest.raises(CaseError, match=r"^step 7: the flow at a fiber was predicted with an error of 4 m/s"):
+        run(tmp_path, Wind(7, -3.0)).to_the_end()
+
+
+def test_a_flow_that_is_not_finite_is_refused_at_its_step(tmp_path):
+    with pytest.raises(
+        FloatingPointError, match=r"sampled velocity is not finite at fiber 0, time 0\.14, after step 7"
+    ):
+        run(tmp_path, Wind(7, np.nan)).to_the_end()

@@ -1,0 +1,138 @@
+"""`gbm run --flow spectral`: one case, the other engine, the same kind of results."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from gbm_plugin.output.recording import open_recording
+from gbm_plugin.output.tables import read_dat
+
+from conftest import gbm, make_case, run_case, set_entry
+
+SPECTRAL = ("--flow", "spectral")
+
+
+def results(path):
+    table = read_dat(path / "spectral/postProcessing/linearForcing", "linearForcing.dat")
+    with open_recording(path / "spectral/postProcessing/fibers") as recording:
+        return table, recording.times, recording.families["test"].positions[:]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    path = make_case(tmp_path_factory.mktemp("whole") / "case", cells=24, prepared=False)
+    run_case(path, *SPECTRAL)
+    return path
+
+
+def test_both_engines_agree(whole, tmp_path):
+    """The same initial modes, forcing and seeds; after 0.4 time units apart by the error of 24^3 cells."""
+    path = make_case(tmp_path / "case", cells=24, tight=False)
+    run_case(path)
+    flow = read_dat(path / "postProcessing/linearForcing", "linearForcing.dat")
+    with open_recording(path / "postProcessing/fibers") as recording:
+        x = recording.families["test"].positions[:]
+    table, _, y = results(whole)
+    np.testing.assert_allclose(flow["Time"], table["Time"], atol=1e-9)
+    assert flow["k"][0] == pytest.approx(table["k"][0], rel=1e-12)
+    np.testing.assert_allclose(flow["k"], table["k"], rtol=0.01)
+    np.testing.assert_allclose(x[0], y[0], atol=1e-10)  # the mesh has its corners from a file
+    moved = np.linalg.norm(y[-1] - y[0], axis=-1).max()
+    assert np.abs(x[-1] - y[-1]).max() < 0.1 * moved
+
+
+def test_the_budget_closes(whole):
+    """dk/dt = P - epsilon to the second order in the step that the table's differences have."""
+    table, *_ = results(whole)
+    middle = 0.5 * (table["epsilonLaplacian"][1:] + table["epsilonLaplacian"][:-1])
+    np.testing.assert_allclose(table["epsilonBudget"][1:], middle, rtol=1e-3)
+
+
+def test_the_results_are_a_case(whole):
+    done = gbm("report", whole / "spectral")
+    assert done.returncode == 0, done.stderr
+    assert (whole / "spectral/report/fibers.png").is_file()
+
+
+def test_a_killed_run_continues_to_the_same_bits(whole, tmp_path):
+    path = make_case(tmp_path / "case", cells=24, prepared=False)
+    set_entry(path / "system/controlDict", "endTime", "0.3")
+    run_case(path, *SPECTRAL)
+    (
+        path / "spectral/0.3/uniform/fibers.npz"
+    ).unlink()  # killed while it wrote: 0.2 is the latest complete time
+    set_entry(path / "system/controlDict", "endTime", "0.4")
+    done = run_case(path, *SPECTRAL)
+    assert "falling back to time 0.2" in done.stdout
+    assert (path / "spectral/previous/1/0.3/U").is_file()
+    for a, b in zip(results(path), results(whole), strict=True):
+        if isinstance(a, dict):
+            for column in a:
+                np.testing.assert_array_equal(a[column], b[column], err_msg=column)
+        else:
+            np.testing.assert_array_equal(a, b)
+
+
+def test_a_signal_stops_it_cleanly(tmp_path):
+    path = make_case(tmp_path / "case", cells=24, steps=5000, write_every=5000, prepared=False)
+    argv = [sys.executable, "-m", "gbm_plugin.cli", "run", str(path), *SPECTRAL]
+    process = subprocess.Popen(argv, stderr=subprocess.PIPE, text=True)
+    table = path / "spectral/postProcessing/linearForcing/0/linearForcing.dat"
+    while not (table.is_file() and len(table.read_text().splitlines()) > 10):
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGTERM)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 1 and "stopped on request" in errors and "Traceback" not in errors
+    saved = [p for p in (path / "spectral").glob("*/uniform/fibers.npz")]
+    assert len(saved) == 1
+
+
+ESWARAN_POPE = "eswaranPope { type eswaranPope; variance 5e-3; timeScale 0.5; cutoff 2.8284; seed 4; }"
+
+
+def test_the_papers_forcing_is_the_spectral_solvers(tmp_path):
+    """The same entry drives one engine, from its seed to the same bits, and is refused by the other."""
+    runs = []
+    for name in ("one", "two"):
+        path = make_case(tmp_path / name, steps=5, prepared=False, fv_options=ESWARAN_POPE)
+        run_case(path, *SPECTRAL)
+        runs.append(results(path)[0])
+    np.testing.assert_array_equal(runs[0]["k"], runs[1]["k"])
+    assert np.abs(runs[0]["power"]).max() > 0
+    done = gbm("run", path)
+    assert done.returncode == 1
+    assert (
+        "eswaranPope is a forcing of the spectral solver" in done.stderr
+        and len(done.stderr.splitlines()) == 1
+    )
+
+
+def test_a_gpu_that_is_not_there_is_named(tmp_path):
+    path = make_case(tmp_path / "case", steps=1, prepared=False)
+    done = gbm("run", path, *SPECTRAL, "--device", "gpu")
+    if done.returncode:  # on a machine that has one, it runs
+        assert "needs CuPy and a CUDA device" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (("constant/fiberProperties", "interpolation", "cellPoint"), "allowed: trilinear cubic exact"),
+        (("system/blockMeshDict", "n", "15"), "same even number"),
+    ],
+)
+def test_what_it_cannot_do_is_refused(tmp_path, change, message):
+    path = make_case(tmp_path / "case", prepared=False)
+    file, entry, value = change
+    set_entry(path / file, entry, value)
+    done = gbm("run", path, *SPECTRAL)
+    assert done.returncode == 1
+    assert message in done.stderr and "Traceback" not in done.stderr

@@ -1,0 +1,48 @@
+"""The stationary study in small: too coarse to agree, but every number is a known one or has a known sign."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gbm_plugin.studies.validate import stationary
+
+from conftest import DEFAULT_CASE
+
+POWER = 0.05
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    folder, turnovers = tmp_path_factory.mktemp("stationary"), 40
+    jobs = [("openfoam", 12, 0.12), ("spectral", 16, 0.1)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stationary, "FIBERS", stationary.FIBERS.replace("count 80", "count 2"))
+        results = {job: stationary.solve(DEFAULT_CASE, folder, *job, turnovers) for job in jobs}
+    return stationary.compare(results, turnovers)
+
+
+def test_energy_balance_of_both_engines(result):
+    rows = {row["quantity"]: row for row in result["rows"]}
+    for run in ("openfoam 12", "spectral 16"):
+        budget = rows["eps budget"]
+        assert abs(budget[run] - POWER) < 4 * budget[f"{run} error"] + 0.01 * POWER
+    # the spectral solver loses nothing to its scheme; finite volumes do, and read too little of gradients
+    lost = rows["numerical dissipation / eps"]
+    assert abs(lost["spectral 16"]) < 0.01 < lost["openfoam 12"] < 0.5
+    assert rows["eps gradient"]["openfoam 12"] < 0.9 * rows["eps laplacian"]["openfoam 12"]
+    assert rows["eps spectrum"]["spectral 16"] == pytest.approx(rows["eps gradient"]["spectral 16"], rel=0.03)
+
+
+def test_curves_are_whole(result):
+    for run in result["runs"]:
+        for curve in run["curvature"].values():
+            assert 0.95 < np.sum(np.diff(curve["edges"]) * curve["mean"]) <= 1 + 1e-12
+        spectrum = run["spectrum"]
+        assert sum(spectrum["mean"]) == pytest.approx(run["numbers"]["k"][0], rel=0.05)  # shells of width 1
+    assert "openfoam 12" in stationary.table(result) and stationary.draw(result) is not None
+
+
+def test_short_runs_are_refused():
+    with pytest.raises(ValueError, match="at least are needed"):
+        stationary.run(DEFAULT_CASE, turnovers=5)
