@@ -212,7 +212,7 @@ def _info(arguments) -> dict:
 
 
 def _validate(arguments) -> dict:
-    study = import_module(f".validation.{arguments.study}", __package__)
+    study = import_module(f".studies.validate.{arguments.study}", __package__)
     given = {name: getattr(arguments, name) for name in ("cells", "time_step")}
     result = study.run(arguments.case, **{name: value for name, value in given.items() if value is not None})
     print(study.table(result))
