@@ -245,7 +245,7 @@ def test_walls_are_refused(box):
 
 
 def test_graded_cells_are_refused(box):
-    assert "needs a uniform mesh" in refusal(box(grading=2))
+    assert "its cells are not all of one size" in refusal(box(grading=2))
 
 
 def test_coarse_levels_are_refused(box):

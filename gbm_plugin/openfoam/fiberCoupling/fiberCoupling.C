@@ -100,8 +100,8 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
     );
 
     box_.reset(new periodicBox(mesh_));
-    sampler_ = sampler::New(fiberProperties, mesh_, box_());
-    beads_.reset(new beadExchange(box_(), sampler_->places()));
+    sampler_ = sampler::New(fiberProperties, mesh_);
+    beads_.reset(new beadExchange(box_(), locator::of(mesh_)));
 
     if (Pstream::master())
     {
@@ -313,7 +313,7 @@ void Foam::functionObjects::fiberCoupling::sendSample
 
     const scalarList sampled
     (
-        sampler_->sample(U, wanted_, beads_->points(), beads_->cells())
+        sampler_->sample(U, wanted_, beads_())
     );
     t.sampling += watch.lap();
 

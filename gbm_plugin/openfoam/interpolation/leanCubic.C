@@ -175,10 +175,9 @@ Foam::tmp<Foam::surfaceVectorField> Foam::leanCubic::correction
         )
     );
 
-    const latticeFaces& faces = latticeFaces::New(mesh);
-    if (faces.uniform())
+    if (uniformBox::New(mesh).problem().empty())
     {
-        fromRows(U, faces, tcorrection.ref());
+        fromRows(U, latticeFaces::New(mesh), tcorrection.ref());
     }
     else
     {

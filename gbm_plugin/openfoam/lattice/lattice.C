@@ -1,97 +1,34 @@
 #include "lattice.H"
 
+namespace Foam
+{
+    defineTypeNameAndDebug(lattice, 0);
+}
+
+
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
-Foam::autoPtr<Foam::lattice> Foam::lattice::New
-(
-    const fvMesh& mesh,
-    const periodicBox& box
-)
+Foam::lattice::lattice(const fvMesh& mesh)
+:
+    MeshObject<fvMesh, Foam::GeometricMeshObject, lattice>(mesh),
+    box_(uniformBox::New(mesh))
 {
-    autoPtr<lattice> l(new lattice(mesh, box));
-
-    if (!l->measure())
+    if (!box_.problem().empty())
     {
-        return nullptr;
+        FatalErrorInFunction
+            << "a lattice needs a uniform, periodic box: "
+            << box_.problem().c_str() << exit(FatalError);
     }
 
     labelList remoteSlots;
     labelList remoteNumbers;
-    l->layOut(remoteSlots, remoteNumbers);
-    l->connect(remoteSlots, remoteNumbers);
-    l->divide();
-
-    return l;
+    layOut(remoteSlots, remoteNumbers);
+    connect(remoteSlots, remoteNumbers);
+    divide();
 }
 
 
 // * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
-
-bool Foam::lattice::measure()
-{
-    vector h(vector::max);
-
-    if (mesh_.nCells())
-    {
-        const boundBox cell(mesh_.points(), mesh_.cellPoints()[0], false);
-        h = cell.span();
-    }
-    reduce(h, minOp<vector>());
-
-    for (direction d = 0; d < vector::nComponents; ++d)
-    {
-        n_[d] = label(std::round(box_.span()[d]/h[d]));
-        h_[d] = box_.span()[d]/n_[d];
-        perCell_[d] = 1/h_[d];
-    }
-
-    const double all = double(n_.x())*double(n_.y())*double(n_.z());
-    bool uniform = (all == double(returnReduce(mesh_.nCells(), sumOp<label>())));
-
-    // each cell fills its place
-    forAll(mesh_.cellCentres(), celli)
-    {
-        const vector x(mesh_.cellCentres()[celli] - box_.min());
-
-        for (direction d = 0; d < vector::nComponents; ++d)
-        {
-            const scalar s = x[d]/h_[d] - 0.5;
-            uniform = uniform && mag(s - std::round(s)) < 1e-5;
-        }
-        uniform = uniform
-         && mag(mesh_.V()[celli]/(h_.x()*h_.y()*h_.z()) - 1) < 1e-5;
-    }
-
-    return returnReduce(uniform, andOp<bool>());
-}
-
-
-Foam::Vector<Foam::label> Foam::lattice::place(const point& p) const
-{
-    Vector<label> i;
-
-    for (direction d = 0; d < vector::nComponents; ++d)
-    {
-        i[d] = label((p[d] - box_.min()[d])*perCell_[d]);
-        i[d] = max(label(0), min(n_[d] - 1, i[d]));
-    }
-
-    return i;
-}
-
-
-Foam::label Foam::lattice::number(const Vector<label>& place) const
-{
-    Vector<label> i;
-
-    for (direction d = 0; d < vector::nComponents; ++d)
-    {
-        i[d] = (place[d] + n_[d]) % n_[d];
-    }
-
-    return i.x() + n_.x()*(i.y() + n_.y()*i.z());
-}
-
 
 Foam::label Foam::lattice::slot(const Vector<label>& place) const
 {
@@ -115,14 +52,14 @@ Foam::Vector<Foam::label> Foam::lattice::coarsePlace
 
 void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
 {
-    const vectorField& centres = mesh_.cellCentres();
+    const label nCells = mesh_.nCells();
 
     first_ = Vector<label>::zero;
     Vector<label> last(-Vector<label>::one);
 
-    forAll(centres, celli)
+    for (label celli = 0; celli < nCells; ++celli)
     {
-        const Vector<label> i(place(centres[celli]));
+        const Vector<label> i(box_.place(celli));
         first_ = celli ? min(first_, i) : i;
         last = celli ? max(last, i) : i;
     }
@@ -135,18 +72,18 @@ void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
     slots_.setSize(extent_.x()*extent_.y()*extent_.z(), -1);
 
     // local cells by number, then every slot around them
-    Map<label> local(2*centres.size());
-    forAll(centres, celli)
+    Map<label> local(2*nCells);
+    for (label celli = 0; celli < nCells; ++celli)
     {
-        local.insert(number(place(centres[celli])), celli);
+        local.insert(box_.number(box_.place(celli)), celli);
     }
 
     DynamicList<label> slots;
     DynamicList<label> numbers;
 
-    forAll(centres, celli)
+    for (label celli = 0; celli < nCells; ++celli)
     {
-        const Vector<label> c(place(centres[celli]));
+        const Vector<label> c(box_.place(celli));
 
         for (label k = -layers; k <= layers; ++k)
         for (label j = -layers; j <= layers; ++j)
@@ -157,13 +94,13 @@ void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
 
             if (s == -1)
             {
-                s = local.lookup(number(neighbour), -1);
+                s = local.lookup(box_.number(neighbour), -1);
 
                 if (s == -1)
                 {
                     s = -2;     // asked for
                     slots.append(slot(neighbour));
-                    numbers.append(number(neighbour));
+                    numbers.append(box_.number(neighbour));
                 }
             }
         }
@@ -186,7 +123,7 @@ Foam::List<Foam::DynamicList<Foam::label>> Foam::lattice::candidates
 
     forAll(points, p)
     {
-        const Vector<label> i(place(points[p]));
+        const Vector<label> i(box_.place(points[p]));
         const Vector<label> c(coarsePlace(i));
 
         for
@@ -216,7 +153,7 @@ Foam::List<Foam::DynamicList<Foam::label>> Foam::lattice::candidates
 
 Foam::label Foam::lattice::findCell(const point& p) const
 {
-    const label celli = slots_[slot(place(p))];
+    const label celli = slots_[slot(box_.place(p))];
 
     return celli < mesh_.nCells() ? celli : -1;
 }
@@ -228,14 +165,14 @@ const Foam::label* Foam::lattice::around
     vector& weights
 ) const
 {
+    // from the lowest centre; rounded down, as x + 1 is positive
+    const vector x(box_.inCells(p) - vector::uniform(0.5));
     Vector<label> lower;
 
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        // the box's lower corner is at 0, so that x + 1 is positive
-        const scalar x = (p[d] - box_.min()[d])*perCell_[d] - 0.5;
-        lower[d] = label(x + 1) - 1;
-        weights[d] = x - lower[d];
+        lower[d] = label(x[d] + 1) - 1;
+        weights[d] = x[d] - lower[d];
     }
 
     return slots_.cdata() + slot(lower);

@@ -8,32 +8,19 @@ namespace Foam
 
 Foam::latticeFaces::latticeFaces(const fvMesh& mesh)
 :
-    MeshObject<fvMesh, Foam::GeometricMeshObject, latticeFaces>(mesh)
+    MeshObject<fvMesh, Foam::GeometricMeshObject, latticeFaces>(mesh),
+    cells_(lattice::New(mesh)),
+    owners_(mesh.nFaces()),
+    steps_(mesh.nFaces())
 {
-    if (!periodicBox::fills(mesh))
-    {
-        return;
-    }
-    box_.reset(new periodicBox(mesh));
-    lattice_ = lattice::New(mesh, box_());
-    if (!lattice_.valid())
-    {
-        return;
-    }
-
-    const Vector<label> strides(lattice_->strides());
-    owners_.setSize(mesh.nFaces());
-    steps_.setSize(mesh.nFaces());
+    const Vector<label> strides(cells_.strides());
 
     forAll(owners_, facei)
     {
-        const vector area(mesh.faceAreas()[facei]);
-        const vector size(cmptMag(area));
-        const direction d =
-            size.x() > 0.5*mag(area) ? vector::X
-          : size.y() > 0.5*mag(area) ? vector::Y : vector::Z;
+        const direction d = cells_.box().normal(facei);
+        const scalar area = mesh.faceAreas()[facei][d];
 
-        owners_[facei] = lattice_->slotOf(mesh.faceOwner()[facei]);
-        steps_[facei] = area[d] > 0 ? strides[d] : -strides[d];
+        owners_[facei] = cells_.slotOf(mesh.faceOwner()[facei]);
+        steps_[facei] = area > 0 ? strides[d] : -strides[d];
     }
 }

@@ -12,16 +12,17 @@ Foam::labelList Foam::lattice::globalCells
 {
     // A directory spread over the ranks: rank r keeps the numbers of its
     // equal share. Every cell reports there; then the directory is read.
-    const label total = n_.x()*n_.y()*n_.z();
+    const Vector<label>& n = box_.cells();
+    const label total = n.x()*n.y()*n.z();
     const label share = (total + Pstream::nProcs() - 1)/Pstream::nProcs();
     const label mine =
         max(label(0), min(share, total - share*Pstream::myProcNo()));
     const globalIndex directory(mine);
 
     List<DynamicList<labelPair>> reports(Pstream::nProcs());
-    forAll(mesh_.cellCentres(), celli)
+    for (label celli = 0; celli < mesh_.nCells(); ++celli)
     {
-        const label i = number(place(mesh_.cellCentres()[celli]));
+        const label i = box_.number(box_.place(celli));
         reports[i/share].append(labelPair(i % share, cells.toGlobal(celli)));
     }
 
@@ -112,10 +113,11 @@ void Foam::lattice::divide()
     Pstream::scatterList(blocks_);
 
     // 16 blocks in each direction, or cells where there are fewer
+    const Vector<label>& n = box_.cells();
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        coarse_[d] = (n_[d] + 15)/16;
-        nCoarse_[d] = (n_[d] + coarse_[d] - 1)/coarse_[d];
+        coarse_[d] = (n[d] + 15)/16;
+        nCoarse_[d] = (n[d] + coarse_[d] - 1)/coarse_[d];
     }
 
     List<DynamicList<label>> ranks(nCoarse_.x()*nCoarse_.y()*nCoarse_.z());

@@ -1,64 +1,63 @@
 #include "periodicBox.H"
-#include "cyclicPolyPatch.H"
+#include "coupledPolyPatch.H"
 #include "volFields.H"
 
 Foam::periodicBox::periodicBox(const fvMesh& mesh)
 :
     bounds_(mesh.bounds())
 {
-    for (const polyPatch& patch : mesh.boundaryMesh())
-    {
-        const label faces = returnReduce(patch.size(), sumOp<label>());
+    const string why(problem(mesh));
 
-        if (faces && !patch.coupled())
-        {
-            FatalErrorInFunction
-                << "patch '" << patch.name() << "' is of type "
-                << patch.type() << " with " << faces
-                << " faces: fibers need a box that is periodic (cyclic) in"
-                << " all three directions" << exit(FatalError);
-        }
-
-        const cyclicPolyPatch* cyclic = isA<cyclicPolyPatch>(patch);
-        if (cyclic && patch.size() && !cyclic->parallel())
-        {
-            FatalErrorInFunction
-                << "patch '" << patch.name() << "' is cyclic with a rotation:"
-                << " fibers need translational periodicity"
-                << exit(FatalError);
-        }
-    }
-
-    const scalar volume = gSum(mesh.V().field());
-    const vector L = span();
-
-    if (mag(volume/(L.x()*L.y()*L.z()) - 1) > 1e-6)
+    if (!why.empty())
     {
         FatalErrorInFunction
-            << "the mesh fills " << volume << " m3 of its bounding box of "
-            << L.x()*L.y()*L.z() << " m3: fibers need a mesh that is a whole,"
-            << " axis-aligned box" << exit(FatalError);
+            << "fibers need a periodic box: " << why.c_str()
+            << exit(FatalError);
     }
 }
 
 
-bool Foam::periodicBox::fills(const fvMesh& mesh)
+Foam::string Foam::periodicBox::problem(const fvMesh& mesh)
 {
-    for (const polyPatch& patch : mesh.boundaryMesh())
-    {
-        const label faces = returnReduce(patch.size(), sumOp<label>());
-        const cyclicPolyPatch* cyclic = isA<cyclicPolyPatch>(patch);
-        const bool turned = cyclic && patch.size() && !cyclic->parallel();
+    // Patches between ranks are other ones, and other numbers of them, on
+    // each rank: what all ranks do is done for the rest, which all ranks have
+    const polyBoundaryMesh& patches = mesh.boundaryMesh();
+    const label nPatches = patches.nNonProcessor();
+    labelList wrong(nPatches, Zero);
 
-        if (faces && (!patch.coupled() || returnReduce(turned, orOp<bool>())))
+    for (label patchi = 0; patchi < nPatches; ++patchi)
+    {
+        const auto* coupled = isA<coupledPolyPatch>(patches[patchi]);
+        if (!coupled || !coupled->parallel())
         {
-            return false;
+            wrong[patchi] = patches[patchi].size();
         }
     }
+    Pstream::listCombineGather(wrong, plusEqOp<label>());
+    Pstream::listCombineScatter(wrong);
 
+    const scalar volume = gSum(mesh.V().field());
     const vector L(mesh.bounds().span());
 
-    return mag(gSum(mesh.V().field())/(L.x()*L.y()*L.z()) - 1) <= 1e-6;
+    OStringStream why;
+    for (label patchi = 0; patchi < nPatches; ++patchi)
+    {
+        if (wrong[patchi])
+        {
+            why << "patch '" << patches[patchi].name() << "' is of type "
+                << patches[patchi].type() << " with " << wrong[patchi]
+                << (patches[patchi].coupled() ? " turned faces" : " faces")
+                << " and not periodic (cyclic) in all three directions, by"
+                << " translation";
+            return why.str();
+        }
+    }
+    if (mag(volume/(L.x()*L.y()*L.z()) - 1) > 1e-6)
+    {
+        why << "the mesh fills " << volume << " m3 of its bounding box of "
+            << L.x()*L.y()*L.z() << " m3 and is not a whole, axis-aligned box";
+    }
+    return why.str();
 }
 
 

@@ -38,10 +38,7 @@ Foam::periodicLaplacian::periodicLaplacian(const fvMesh& mesh)
 
     forAll(directions_, facei)
     {
-        const vector area(cmptMag(mesh.faceAreas()[facei]));
-        directions_[facei] =
-            (area.x() > 0.5*mag(area) ? vector::X
-          : area.y() > 0.5*mag(area) ? vector::Y : vector::Z);
+        directions_[facei] = uniformBox::New(mesh).normal(facei);
         nFaces_[directions_[facei]] += 1;
     }
     reduce(nFaces_, sumOp<vector>());

@@ -1,13 +1,24 @@
 #include "slab.H"
-#include "coupledPolyPatch.H"
-#include "volFields.H"
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
 Foam::slab::slab(const fvMesh& mesh)
+:
+    places_(mesh.nCells())
 {
-    checkPatches(mesh);
-    findPlaces(mesh);
+    const uniformBox& box = uniformBox::New(mesh);
+    if (!box.problem().empty())
+    {
+        FatalErrorInFunction
+            << "Fourier transforms need a uniform, periodic box: "
+            << box.problem().c_str() << exit(FatalError);
+    }
+
+    n_ = box.cells();
+    forAll(places_, celli)
+    {
+        places_[celli] = box.place(celli);
+    }
 
     layers_ = places_.size()/(n_.x()*n_.y());
     block_ = returnReduce(layers_, maxOp<label>());
@@ -22,71 +33,6 @@ Foam::slab::slab(const fvMesh& mesh)
 
 
 // * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
-
-void Foam::slab::checkPatches(const fvMesh& mesh) const
-{
-    for (const polyPatch& patch : mesh.boundaryMesh())
-    {
-        const label faces = returnReduce(patch.size(), sumOp<label>());
-        const coupledPolyPatch* coupled = isA<coupledPolyPatch>(patch);
-
-        if (faces && (!coupled || !coupled->parallel()))
-        {
-            FatalErrorInFunction
-                << "patch '" << patch.name() << "' is of type "
-                << patch.type() << (coupled ? " with a rotation" : "")
-                << ": periodicFFT needs a box that is cyclic, by translation,"
-                << " in all three directions" << exit(FatalError);
-        }
-    }
-}
-
-
-void Foam::slab::findPlaces(const fvMesh& mesh)
-{
-    const vector L(mesh.bounds().span());
-    vector h(vector::max);
-
-    if (mesh.nCells())
-    {
-        const labelList corners(mesh.cells()[0].labels(mesh.faces()));
-        h = boundBox(mesh.points(), corners, false).span();
-    }
-    reduce(h, minOp<vector>());
-
-    for (direction d = 0; d < vector::nComponents; ++d)
-    {
-        n_[d] = label(std::round(L[d]/h[d]));
-        h[d] = L[d]/n_[d];
-    }
-
-    const double all = double(n_.x())*double(n_.y())*double(n_.z());
-    bool uniform = (all == double(returnReduce(mesh.nCells(), sumOp<label>())));
-
-    places_.setSize(mesh.nCells());
-    forAll(places_, celli)
-    {
-        const vector x(mesh.cellCentres()[celli] - mesh.bounds().min());
-
-        for (direction d = 0; d < vector::nComponents; ++d)
-        {
-            const scalar s = x[d]/h[d] - 0.5;
-            const label i = label(std::round(s));
-            uniform = uniform && mag(s - i) < 1e-5 && 0 <= i && i < n_[d];
-            places_[celli][d] = i;
-        }
-        uniform = uniform
-         && mag(mesh.V()[celli]/(h.x()*h.y()*h.z()) - 1) < 1e-5;
-    }
-
-    if (!returnReduce(uniform, andOp<bool>()))
-    {
-        FatalErrorInFunction
-            << "the mesh is not a whole, axis-aligned box of equal cells:"
-            << " periodicFFT needs a uniform mesh" << exit(FatalError);
-    }
-}
-
 
 void Foam::slab::checkDecomposition() const
 {
@@ -104,7 +50,7 @@ void Foam::slab::checkDecomposition() const
     {
         FatalErrorInFunction
             << "the ranks do not hold whole layers of z, equally many and in"
-            << " their order, which periodicFFT needs; in decomposeParDict,"
+            << " their order, which Fourier transforms need; in decomposeParDict,"
             << " with a number of ranks that divides " << n_.z()
             << " layers, use: method simple; simpleCoeffs { n (1 1 "
             << Pstream::nProcs() << "); }" << exit(FatalError);

@@ -6,27 +6,26 @@ Foam::scalarList Foam::latticeSampler<Interpolant>::sample
 (
     const volVectorField& U,
     const ambient wanted,
-    const UList<point>& points,
-    const labelUList&
+    const beadExchange& beads
 ) const
 {
     const vectorField& cells = U.primitiveField();
-    const List<vector> neighbours(lattice_->gather(cells));
-    const vector& perCell = lattice_->perCell();
+    const List<vector> neighbours(lattice_.gather(cells));
+    const vector& perCell = lattice_.box().perCell();
 
     stencil u
     {
-        nullptr, lattice_->strides(), cells.cdata(), neighbours.cdata(),
+        nullptr, lattice_.strides(), cells.cdata(), neighbours.cdata(),
         cells.size()
     };
 
-    scalarList values(points.size()*(3 + components(wanted)));
+    scalarList values(beads.points().size()*(3 + components(wanted)));
     scalar* out = values.begin();
 
-    for (const point& p : points)
+    for (const point& p : beads.points())
     {
         vector x;
-        u.slot = lattice_->around(p, x);
+        u.slot = lattice_.around(p, x);
 
         vector d[3];
         const vector velocity

@@ -1,5 +1,4 @@
 #include "sampler.H"
-#include "cellSearch.H"
 #include "interpolants.H"
 #include "latticeSampler.H"
 #include "schemeSampler.H"
@@ -9,35 +8,28 @@
 Foam::autoPtr<Foam::sampler> Foam::sampler::New
 (
     const dictionary& fiberProperties,
-    const fvMesh& mesh,
-    const periodicBox& box
+    const fvMesh& mesh
 )
 {
     const word scheme =
         fiberProperties.lookupOrDefault<word>("interpolation", "trilinear");
 
-    autoPtr<lattice> cells(lattice::New(mesh, box));
-
     if (scheme == "trilinear" || scheme == "cubic")
     {
-        if (!cells.valid())
+        const string& problem = uniformBox::New(mesh).problem();
+        if (!problem.empty())
         {
             FatalIOErrorInFunction(fiberProperties)
                 << "interpolation " << scheme << " needs a box of equal cells,"
-                << " which this mesh is not; use one of OpenFOAM's own"
-                << " schemes, as cellPoint" << exit(FatalIOError);
+                << " which this mesh is not (" << problem.c_str() << "); use"
+                << " one of OpenFOAM's own schemes, as cellPoint"
+                << exit(FatalIOError);
         }
         if (scheme == "cubic")
         {
-            return autoPtr<sampler>
-            (
-                new latticeSampler<cubic>(std::move(cells))
-            );
+            return autoPtr<sampler>(new latticeSampler<cubic>(mesh));
         }
-        return autoPtr<sampler>
-        (
-            new latticeSampler<trilinear>(std::move(cells))
-        );
+        return autoPtr<sampler>(new latticeSampler<trilinear>(mesh));
     }
 
     if (!interpolation<vector>::dictionaryConstructorTablePtr_->found(scheme))
@@ -53,15 +45,5 @@ Foam::autoPtr<Foam::sampler> Foam::sampler::New
             << exit(FatalIOError);
     }
 
-    autoPtr<locator> places;
-    if (cells.valid())
-    {
-        places.reset(cells.ptr());
-    }
-    else
-    {
-        places.reset(new cellSearch(mesh));
-    }
-
-    return autoPtr<sampler>(new schemeSampler(scheme, std::move(places)));
+    return autoPtr<sampler>(new schemeSampler(scheme));
 }

@@ -13,8 +13,7 @@ void interpolate
 (
     const word& scheme,
     const GeometricField<Type, fvPatchField, volMesh>& field,
-    const UList<point>& points,
-    const labelUList& cells,
+    const beadExchange& beads,
     scalar* out,
     const label stride
 )
@@ -24,9 +23,12 @@ void interpolate
         interpolation<Type>::New(scheme, field)
     );
 
-    forAll(points, i)
+    forAll(beads.points(), i)
     {
-        const Type value(values->interpolate(points[i], cells[i]));
+        const Type value
+        (
+            values->interpolate(beads.points()[i], beads.cells()[i])
+        );
         for (direction c = 0; c < pTraits<Type>::nComponents; ++c)
         {
             out[i*stride + c] = value[c];
@@ -41,26 +43,25 @@ Foam::scalarList Foam::schemeSampler::sample
 (
     const volVectorField& U,
     const ambient wanted,
-    const UList<point>& points,
-    const labelUList& cells
+    const beadExchange& beads
 ) const
 {
     const label stride = 3 + components(wanted);
-    scalarList values(points.size()*stride);
+    scalarList values(beads.points().size()*stride);
     scalar* out = values.begin();
 
-    interpolate(scheme_, U, points, cells, out, stride);
+    interpolate(scheme_, U, beads, out, stride);
 
     if (wanted == ROTATION)
     {
         const volVectorField rotation(0.5*fvc::curl(U));
-        interpolate(scheme_, rotation, points, cells, out + 3, stride);
+        interpolate(scheme_, rotation, beads, out + 3, stride);
     }
     else if (wanted == GRADIENT)
     {
         // OpenFOAM's gradient is the transpose of du_i/dx_j
         const volTensorField gradient(fvc::grad(U)().T());
-        interpolate(scheme_, gradient, points, cells, out + 3, stride);
+        interpolate(scheme_, gradient, beads, out + 3, stride);
     }
 
     return values;

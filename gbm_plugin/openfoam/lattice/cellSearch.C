@@ -1,5 +1,11 @@
 #include "cellSearch.H"
 
+namespace Foam
+{
+    defineTypeNameAndDebug(cellSearch, 0);
+}
+
+
 Foam::labelList Foam::cellSearch::owners(const UList<point>& points) const
 {
     // A point on a face between ranks may be found by both or, by rounding,
