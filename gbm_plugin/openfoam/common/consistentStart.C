@@ -58,7 +58,15 @@ void Foam::consistentStart
             false
         );
 
-        if (!file.typeHeaderOk<surfaceScalarField>(false))
+        // each rank looks for its own file
+        if
+        (
+            !returnReduce
+            (
+                file.typeHeaderOk<surfaceScalarField>(false),
+                andOp<bool>()
+            )
+        )
         {
             *phi = fvc::flux(*U);
         }
