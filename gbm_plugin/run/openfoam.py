@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..case.dictionary import CaseError
@@ -23,6 +23,7 @@ from ..case.share import Share, all_shares
 from ..case.times import choose_start
 from ..output.restarts import keep_earlier
 from .progress import Progress
+from .standstill import Pulse, kill_session, where_it_stands
 
 log = logging.getLogger(__name__)
 
@@ -131,6 +132,7 @@ class _Processes:
         self.solver: subprocess.Popen | None = None
         self.stopping = 0
         self.ended_here: set[subprocess.Popen] = set()  # by this process, after another one's end
+        self.standstill = ""  # what was seen of a run that made no step
 
     def run(self) -> None:
         # in sessions of their own: Ctrl-C reaches this process alone, which then ends all in order
@@ -170,11 +172,10 @@ class _Processes:
         if process.poll() is None:
             self.ended_here.add(process)
             process.terminate()
-            try:
+            with suppress(subprocess.TimeoutExpired):  # where it hangs, or was stopped
                 process.wait(3)
-            except subprocess.TimeoutExpired:  # it hangs, or was stopped
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+        kill_session(process.pid)
+        process.wait()
 
     def _stop(self, *_) -> None:
         self.stopping += 1
@@ -186,14 +187,19 @@ class _Processes:
             self.solver.terminate()
 
     def _watch(self) -> None:
-        """Until all have ended, or one has outlived another for too long."""
+        """Until all have ended, one has outlived another for too long, or none makes a step any more."""
         everyone = [self.solver, *(d.process for d in self.daemons)]
+        pulse = Pulse(self.case, [self.solver_log, *(d.log for d in self.daemons)])
+        limit = self.scene.coupling.timeout + GRACE  # who waits for another knows more, and gives up first
         alone_since = None
         with Progress(self.scene, self.start_time) as progress:
             while any(process.poll() is None for process in everyone):
                 time.sleep(0.1)
                 progress.update()
                 if all(process.poll() is None for process in everyone):
+                    if pulse.silence() > limit:
+                        self.standstill = self._where_all_stand(limit)
+                        break
                     continue
                 if alone_since is None:
                     alone_since = time.monotonic()
@@ -204,6 +210,15 @@ class _Processes:
                 elif time.monotonic() - alone_since > grace:
                     break
             progress.update()
+
+    def _where_all_stand(self, seconds: float) -> str:
+        sides = [(self.scene.application, self.solver, self.solver_log)]
+        sides += [(str(d.share), d.process, d.log) for d in self.daemons]
+        stands = "; ".join(where_it_stands(name, process.pid, log) for name, process, log in sides)
+        return (
+            f"no step for {seconds:g} s ({GRACE:g} s more than the entry timeout of constant/fiberProperties), so "
+            f"the run was ended: {stands}"
+        )
 
     def _dismiss(self) -> None:
         """End at once who would only wait for a partner that does not come."""
@@ -216,6 +231,8 @@ class _Processes:
             process.terminate()
 
     def _judge(self) -> None:
+        if self.standstill:
+            raise RunError(self.standstill)
         solver = self.solver.returncode
         problem = fatal_message(self.solver_log)
         if not any((solver, *(d.process.returncode for d in self.daemons))):

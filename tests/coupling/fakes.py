@@ -254,6 +254,13 @@ def children(pid: int) -> dict[str, int]:
     return found
 
 
+def is_solver(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/comm").read_text().strip() == "pimpleFoam"
+    except OSError:
+        return False
+
+
 class Run:
     """A `gbm run` in the background."""
 

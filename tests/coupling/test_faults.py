@@ -15,8 +15,9 @@ import pytest
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.coupling.message import Kind, Message
 from gbm_plugin.output.recording import open_recording
+from gbm_plugin.run.standstill import members
 
-from conftest import gbm, make_case, set_entry, start_solver
+from conftest import divide, gbm, make_case, set_entry, start_solver
 from fakes import (
     FakeSolver,
     Run,
@@ -24,6 +25,7 @@ from fakes import (
     fake_daemon,
     greet,
     header,
+    is_solver,
     kill_all_of,
     one_line,
     positions,
@@ -488,6 +490,21 @@ def test_of_a_run(victim, harm, long_case):
     assert not any(os.path.exists(f"/proc/{pid}") for pid in both.values())
     assert records(long_case) >= 12
     _continues(long_case, 12)
+
+
+def test_run_that_hangs_before_its_first_step(long_case):
+    """Nobody waits for anybody with a timeout yet: `gbm run` itself ends it and says where it stood."""
+    divide(long_case, 3, (1, 3, 1))
+    run = Run(long_case, "--parallel")
+    until(lambda: "solver" in children(run.process.pid), "the solver's start")
+    solver = children(run.process.pid)["solver"]
+    victim = until(lambda: [pid for pid, _ in members(solver) if is_solver(pid)], "a rank")[-1]
+    os.kill(victim, signal.SIGSTOP)
+    line = run.line()
+    assert f"no step for {TIMEOUT + 5:g} s" in line
+    assert f"pimpleFoam was stopped by a signal (process {victim}; {long_case}/log.pimpleFoam)" in line
+    assert "the daemon said last 'waiting for OpenFOAM (socket)'" in line
+    assert not list(members(solver))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
