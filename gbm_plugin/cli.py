@@ -12,6 +12,10 @@ from importlib import import_module
 from pathlib import Path
 
 from . import __version__
+from .errors import GbmError
+
+# what is said in one line: the rest is a fault of the program, with its traceback
+EXPECTED = (GbmError, ValueError, OSError, FloatingPointError)
 
 STUDIES = {  # modules of validation/, each with run, table and draw
     "convergence": "errors of flow and fibers as cells and step shrink (default)",
@@ -28,10 +32,6 @@ def main(argv: list[str] | None = None) -> int:
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
     try:
-        from .coupling.channel import CouplingError
-        from .run.openfoam import RunError
-
-        expected = (ValueError, CouplingError, RunError, OSError, FloatingPointError)
         result = arguments.action(arguments)
         if result is not None and getattr(arguments, "json", None):
             Path(arguments.json).write_text(json.dumps(result, indent=2) + "\n")
@@ -40,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _failed(arguments.command, "stopped on request")
     except Exception as error:
-        if not isinstance(error, expected):
+        if not isinstance(error, EXPECTED):
             raise
         return _failed(arguments.command, str(error))
     return 0

@@ -11,13 +11,10 @@ from PyFoam.Basics.DataStructures import BoolProxy
 from PyFoam.Error import PyFoamException
 from PyFoam.RunDictionary.ParsedParameterFile import ParsedParameterFile, PyFoamParserError
 
+from ..errors import CaseError
 from .macros import MacroError, expand
 
 _REQUIRED: Any = object()
-
-
-class CaseError(ValueError):
-    """A mistake in a case: says the file, the entry, what was given and what is allowed."""
 
 
 class Dictionary:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .dictionary import CaseError, Dictionary
+from ..errors import CaseError
+from .dictionary import Dictionary
 from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
 
 END = f"// {73 * '*'} //"  # the last line of what OpenFOAM writes: the file is whole

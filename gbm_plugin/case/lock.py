@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .dictionary import CaseError
+from ..errors import CaseError, LockedError
 
 RUN, DAEMON = "run", "daemon"
 
@@ -16,7 +16,7 @@ RUN, DAEMON = "run", "daemon"
 @contextmanager
 def locked(case: Path, who: str) -> Iterator[int]:
     """The only run or daemon of a case. Yields the lock's descriptor: a child process that gets it keeps the
-    case locked although this process dies. CaseError where another process has the lock."""
+    case locked although this process dies. LockedError where another process has the lock."""
     try:
         file = (case / f".gbm.{who}.lock").open("a+")
     except OSError as error:
@@ -26,7 +26,7 @@ def locked(case: Path, who: str) -> Iterator[int]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             file.seek(0)
-            raise CaseError(
+            raise LockedError(
                 f"another {who} is under way in {case} (process {file.read().strip()}, or one that it started)"
             ) from None
         file.truncate(0)

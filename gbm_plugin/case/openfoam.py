@@ -8,7 +8,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from .dictionary import CaseError
+from ..errors import InstallationError, UtilityError
+from .layout import log_file
 
 DEBIAN = Path("/usr/share/openfoam")
 PLUGIN = "libgbmPlugin.so"
@@ -17,26 +18,26 @@ PLUGIN = "libgbmPlugin.so"
 def environment() -> dict[str, str]:
     """Variables for OpenFOAM's programs: a sourced OpenFOAM as it is, else Debian's package.
 
-    CaseError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
+    InstallationError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
     """
     env = dict(os.environ)
     sourced = "WM_PROJECT_DIR" in env and Path(env["WM_PROJECT_DIR"]) != DEBIAN
     if not sourced:
         if not (DEBIAN / "etc").is_dir():
-            raise CaseError(
+            raise InstallationError(
                 "OpenFOAM is not installed (Debian: the package openfoam), nor is one sourced: run ./Allrun"
             )
         env |= {"WM_PROJECT_DIR": str(DEBIAN), "WM_PROJECT_VERSION": "v1912"}
     version = env.get("WM_PROJECT_VERSION", "v1912")
     if not re.fullmatch(r"v(19[12]\d|2\d\d\d)", version):
-        raise CaseError(
+        raise InstallationError(
             f"OpenFOAM '{version}' is not supported: openfoam.com v1912 or later is needed "
             "(www.openfoam.com names its releases vYYMM)"
         )
     own = Path(__file__).resolve().parents[2] / "build/lib"
     library = Path(env.get("FOAM_USER_LIBBIN", own)) if sourced else own  # each has its own binary interface
     if not (library / PLUGIN).is_file():
-        raise CaseError(f"the plugin {PLUGIN} is not in {library}: build it with ./Allwmake")
+        raise InstallationError(f"the plugin {PLUGIN} is not in {library}: build it with ./Allwmake")
     env["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, [str(library), env.get("LD_LIBRARY_PATH", "")]))
     env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return env
@@ -45,7 +46,7 @@ def environment() -> dict[str, str]:
 def command(program: str, case: Path, ranks: int = 1) -> list[str]:
     """argv of a program on a case, on this many MPI ranks."""
     if shutil.which(program) is None:
-        raise CaseError(f"the OpenFOAM program '{program}' is not on the PATH")
+        raise InstallationError(f"the OpenFOAM program '{program}' is not on the PATH")
     argv = [program, "-case", str(case)]
     if ranks > 1:
         argv = ["mpirun", "-np", str(ranks), "--oversubscribe", *argv, "-parallel"]
@@ -53,8 +54,8 @@ def command(program: str, case: Path, ranks: int = 1) -> list[str]:
 
 
 def utility(case: Path, program: str, *options: str) -> None:
-    """Run a utility to its end, its output in `log.<program>`. CaseError with its own words where it fails."""
-    log = case / f"log.{program}"
+    """Run a utility to its end, its output in `log.<program>`. UtilityError with its own words where it fails."""
+    log = log_file(case, program)
     with log.open("w") as output:
         done = subprocess.run(
             [*command(program, case), *options],
@@ -64,7 +65,9 @@ def utility(case: Path, program: str, *options: str) -> None:
             stdin=subprocess.DEVNULL,
         )
     if done.returncode != 0:
-        raise CaseError(f"{program} failed: {fatal_message(log) or f'exit code {done.returncode}'} ({log})")
+        raise UtilityError(
+            f"{program} failed: {fatal_message(log) or f'exit code {done.returncode}'} ({log})"
+        )
 
 
 def fatal_message(log: Path) -> str | None:

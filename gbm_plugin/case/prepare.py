@@ -5,11 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from .dictionary import CaseError, Dictionary
+from ..errors import CaseError
+from .dictionary import Dictionary
 from .initial import is_made_here, read_initial_field, write_velocity
+from .layout import fiber_state, processors, time_folders, velocity_file
 from .openfoam import utility
 from .scene import Scene
-from .times import Start, fiber_state, move_aside, time_folders
+from .times import Start, move_aside
 
 
 def prepare(scene: Scene, start: Start, ranks: int) -> None:
@@ -73,7 +75,7 @@ def ranks_of(case: Path, parallel: bool) -> int:
 def reconstruct(case: Path) -> None:
     """The time folders of a decomposed run that are not yet in the case itself, or not wholly."""
     parts = case / "processor0"
-    names = [n for n in time_folders(case).values() for u in ("U", "U.gz") if (parts / n / u).is_file()]
+    names = [n for n in time_folders(case).values() if velocity_file(parts / n)]
     # the state comes last, so a folder without it is what a killed reconstructPar left
     cut = [n for n in names if fiber_state(parts / n) and not fiber_state(case / n)]
     if left := [case / n for n in cut if (case / n).is_dir()]:
@@ -84,7 +86,7 @@ def reconstruct(case: Path) -> None:
 
 def _decompose(case: Path, start: Start, ranks: int) -> None:
     """Make the folders that this number of ranks reads, from those that are there; none is lost."""
-    present = list(case.glob("processor[0-9]*"))
+    present = processors(case)
     if start.continues and len(present) == (ranks if ranks > 1 else 0):
         return
     if present:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .dictionary import CaseError, Dictionary
+from ..errors import CaseError
+from .dictionary import Dictionary
 from .share import Share
 
 INTEGRATORS = ("ab3", "implicit", "auto")

@@ -6,13 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 
-from ..case.scene import Coupling
-from ..case.share import WHOLE, Share
+from ..errors import CouplingError
 from .message import HEADER_SIZE, MAX_TEXT, Kind, Message, ProtocolError, decode_header, encode_header
-
-
-class CouplingError(RuntimeError):
-    """The coupling ended otherwise than agreed: names the cause, the peer and its log."""
 
 
 class Channel(ABC):
@@ -74,13 +69,3 @@ class Listener(ABC):
 
     def __exit__(self, *_) -> None:
         self.close()
-
-
-def listen(case: Path, coupling: Coupling, log: Path, share: Share = WHOLE) -> Listener:
-    """Open the way that the case's word `transport` names; log: the solver's, for messages; share: whose of the
-    case's daemons."""
-    from .files import FileListener
-    from .sockets import TcpListener, UnixListener
-
-    kinds = {"socket": UnixListener, "tcp": TcpListener, "file": FileListener}
-    return kinds[coupling.transport](case, coupling, log, share)

@@ -16,17 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
-from ..case.dictionary import CaseError
+from ..case.layout import fiber_state, find_state, log_file, results, states
 from ..case.lock import DAEMON, locked
-from ..case.scene import Family, Scene, read_scene
+from ..case.scene import Scene, read_scene
 from ..case.share import Share
-from ..case.times import as_time, fiber_state
+from ..errors import CaseError, CouplingError, StateError
 from ..fleet.fleet import Fleet
-from ..fleet.steptable import StepTable
-from ..output.recording import FamilyRecord, Recorder
-from ..output.restarts import keep_earlier
-from .channel import Channel, CouplingError, Listener, listen
+from ..fleet.journal import Journal
+from .channel import Channel, Listener
+from .listen import listen
 from .message import (
     PROVISIONAL,
     STOP,
@@ -58,7 +56,7 @@ def serve(case: Path | str, number: int | None = None) -> None:
     share = _share(scene, number)
     scene = scene.part(share)
     stop = _StopFlag()
-    solver_log = case / f"log.{scene.application}"
+    solver_log = log_file(case, scene.application)
     with (
         locked(case, share.name(DAEMON)),
         listen(case, scene.coupling, solver_log, share) as listener,
@@ -150,18 +148,22 @@ class Session:
         self.step, self.time = first.step, first.time
         self.time_step = hello.time_step
         self.fleet = self._fibers(hello)
-        self.recorder = self._recorder(hello, first.time)
-        self.table = StepTable(self.recorder.path.parent, self.scene.families, self.share)
+        self.journal = Journal(
+            self.scene,
+            self.fleet,
+            results(self.scene.case) / Path(hello.folder).name,
+            origin=hello.box_min,
+            box=np.subtract(hello.box_max, hello.box_min),
+            share=self.share,
+        )
         welcome = encode_welcome(self.fleet.need, self.fleet.sizes)
         self.channel.send(Message(Kind.WELCOME, self.step, self.time, welcome))
         try:
             self._observe()
-            self._record()
             while self._next_step():
                 pass
         finally:
-            self.recorder.close()
-            self.table.close()
+            self.journal.close()
 
     def _receive(self, *kinds: Kind) -> Message:
         message = self.channel.receive(sample_size(self.fleet.beads, self.fleet.need))
@@ -202,7 +204,7 @@ class Session:
         if folder is None:
             earlier = sorted(t for t in states(self.scene.case) if t < self.time)
             if earlier:
-                raise CaseError(
+                raise StateError(
                     f"time {self.time:g} has no complete fiber state (killed while writing?); there are "
                     f"states at {', '.join(f'{t:g}' for t in earlier)}: start from one of these "
                     "('gbm run' does), or remove them all to begin with new fibers"
@@ -211,36 +213,21 @@ class Session:
         else:
             fleet.restore(folder)
             if abs(fleet.time - self.time) > 1e-6 * self.time_step:
-                raise CaseError(f"the fiber state in {folder} is of time {fleet.time:g}, not {self.time:g}")
+                raise StateError(f"the fiber state in {folder} is of time {fleet.time:g}, not {self.time:g}")
             self.time = fleet.time
             log.info("time %g: fibers continue from %s", self.time, fiber_state(folder)[0])
         return fleet
 
-    def _recorder(self, hello: Hello, start: float) -> Recorder:
-        folder = self.scene.case / "postProcessing/fibers" / Path(hello.folder).name
-        return Recorder(
-            keep_earlier(folder / self.share.name("fibers", ".h5")),
-            [family_record(f) for f in self.scene.families],
-            box_origin=hello.box_min,
-            box_size=np.subtract(hello.box_max, hello.box_min),
-            viscosity=self.scene.dynamic_viscosity,
-            density=self.scene.density,
-            dictionaries=self.scene.texts,
-            program_version=__version__,
-        )
-
     def _send_positions(self) -> None:
         flags = (PROVISIONAL if self.fleet.provisional else 0) | (STOP if self.stop else 0)
         payload = encode_array(self.fleet.positions)
-        self.sent_at = (
-            clock.time()
-        )  # when it begins: what no buffer holds waits there until the solver reads it
+        # when it begins: what no buffer holds waits there until the solver reads it
+        self.sent_at = clock.time()
         self.channel.send(Message(Kind.POSITIONS, self.step, self.time, payload, flags))
 
     def _observe(self) -> bool:
         """Send the positions of this step until their sample is final; False where OpenFOAM ends instead."""
         while True:
-            provisional = self.fleet.provisional
             self._send_positions()
             message = self._receive(Kind.SAMPLE, Kind.SAVE, Kind.END)
             if message.kind is Kind.END:
@@ -254,17 +241,12 @@ class Session:
                     folder = self.scene.case / decode_folder(message.payload)
                     message = self._receive(Kind.SAMPLE)
                     self._check_step(message, self.step, self.time)
-                self.arrived_at = clock.time()
+                arrived_at = clock.time()
                 velocity, extra = decode_sample(message, self.fleet.beads, self.fleet.need)
             except ProtocolError as error:
                 raise self.channel.error(str(error)) from None
-            self.fleet.observe(self.time, velocity, extra)
-            if provisional:
-                self.fleet.correct()
+            if not self.journal.take(self.step, velocity, extra, self.sent_at, arrived_at):
                 continue
-            gap = self.fleet.check_prediction(velocity, self.step)
-            ratios = self.fleet.end_to_end_ratio()
-            self.table.add(self.time, self.step, self.sent_at, self.arrived_at, gap, ratios)
             if folder is not None:
                 self.fleet.save(folder, self.step, self.time)
             return True
@@ -280,51 +262,8 @@ class Session:
         self.fleet.advance(self.time_step)
         self.step += 1
         self.time = self.fleet.time
-        if not self._observe():
-            return False
-        if self.step % self.scene.record_interval == 0:
-            self._record()
-        return True
-
-    def _record(self) -> None:
-        self.recorder.append(self.step, self.time, self.fleet.by_family)
+        return self._observe()
 
     def _goodbye(self, end: Message) -> None:
         self.channel.send(Message(Kind.GOODBYE, end.step, end.time))
-        log.info("time %g: OpenFOAM ended the run; recorded in %s", end.time, self.recorder.path)
-
-
-def family_record(f: Family) -> FamilyRecord:
-    """What the recording says of a family."""
-    model = {
-        "integrator": f.model.integrator,
-        "mobility": f.model.mobility,
-        "bendingTorque": f.model.bending_torque,
-        "curvatureLaw": f.model.curvature_law,
-        "strainCoupling": "yes" if f.model.strain_coupling else "no",
-        "shape": f.shape,
-    }
-    if f.model.tolerance is not None:
-        model["tolerance"] = repr(f.model.tolerance)
-    if f.model.repulsion:
-        model["repulsion"] = repr(f.model.repulsion)
-    return FamilyRecord(f.name, f.count, f.beads, f.radius, f.bending_stiffness, f.seed, model)
-
-
-def states(case: Path) -> dict[float, Path]:
-    """Time folders of the case, serial or decomposed, that hold a complete fiber state."""
-    found = {}
-    for pattern in ("processor0/*", "*"):
-        for folder in case.glob(pattern):
-            if (time := as_time(folder.name)) is not None and fiber_state(folder):
-                found[time] = folder
-    return found
-
-
-def find_state(case: Path, folder: str) -> Path | None:
-    """Where the state of this time folder is: there, or in the other of the serial and decomposed ones."""
-    name = Path(folder).name
-    for candidate in (case / folder, case / name, case / "processor0" / name):
-        if fiber_state(candidate):
-            return candidate
-    return None
+        log.info("time %g: OpenFOAM ended the run; recorded in %s", end.time, self.journal.recorder.path)

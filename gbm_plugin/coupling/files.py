@@ -11,7 +11,8 @@ from pathlib import Path
 
 from ..case.scene import Coupling
 from ..case.share import Share
-from .channel import Channel, CouplingError, Listener
+from ..errors import CouplingError
+from .channel import Channel, Listener
 from .message import HEADER_SIZE, MAX_TEXT, Message
 from .sockets import POLL, write_secret
 

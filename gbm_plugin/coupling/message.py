@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.share import Share
+from ..flow import NEEDS
 
 MAGIC = b"GBMC"
 VERSION = 2
@@ -128,9 +129,6 @@ def decode_folder(data: bytes) -> str:
     if not re.fullmatch(r"(processor\d+/)?-?\d+(\.\d+)?(e[-+]?\d+)?", folder, flags=re.ASCII):
         raise ProtocolError(f"{folder[:80]!r} is not a time folder")
     return folder
-
-
-NEEDS = ("velocity", "rotation", "gradient")
 
 
 def encode_welcome(need: str, families: list[tuple[int, int, int]]) -> bytes:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from ..case.scene import Coupling
 from ..case.share import Share
-from .channel import Channel, CouplingError, Listener
+from ..errors import CouplingError
+from .channel import Channel, Listener
 from .message import MAX_TEXT, Kind, Message
 
 PARTING = 1.0  # how long the other side may take to end a connection [s]

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case.dictionary import CaseError
+from ..case.layout import STATE_FILE, fiber_state
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
-from ..case.times import STATE_FILE, fiber_state
-from ..coupling.message import NEEDS
+from ..errors import CaseError, PredictionError, StateError
 from ..fiber import Fibers, Stepper, merged_states
+from ..flow import NEEDS
 from ..statistics.fibers import end_to_end_squared_ratio
 
 log = logging.getLogger(__name__)
@@ -134,12 +134,12 @@ class Fleet:
 
     def check_prediction(self, velocity: np.ndarray, step: int) -> float:
         """The prediction gap [m/s], compared to the rms of the sampled velocity (B, 3): it is an error that no
-        estimate inside the fibers sees. A word in the log where it is large, CaseError where it is of the flow's
+        estimate inside the fibers sees. A word in the log where it is large, PredictionError where it is of the flow's
         order."""
         rms = float(np.sqrt(3 * np.mean(velocity**2)))
         gap = self.prediction_gap
         if gap > GAP_LIMIT * rms > 0:
-            raise CaseError(
+            raise PredictionError(
                 f"step {step}: the flow at a fiber was predicted with an error of {gap:g} m/s, more than its rms "
                 f"of {rms:g} m/s: the time step is too long for this flow"
             )
@@ -185,12 +185,12 @@ class Fleet:
             raise OSError(error.errno, error.strerror, str(path)) from None
 
     def restore(self, folder: Path) -> None:
-        """Continue from the state in a time folder, whatever daemons shared it. ValueError where it is of other
+        """Continue from the state in a time folder, whatever daemons shared it. StateError where it is of other
         fibers or unreadable."""
         self._positions = None
         paths = fiber_state(folder)
         if not paths:
-            raise CaseError(f"{folder} holds no complete fiber state")
+            raise StateError(f"{folder} holds no complete fiber state")
         states = [self._read_state(path) for path in paths]
         shares = all_shares(len(paths))
         for family, stepper in zip(self.families, self.steppers, strict=True):
@@ -203,7 +203,7 @@ class Fleet:
             try:
                 stepper.restore(merged_states(own, slice(family.first - offset, end - offset)))
             except (KeyError, ValueError) as error:
-                raise CaseError(f"the fiber state {paths[held[0]]} cannot be read: {error}") from None
+                raise StateError(f"the fiber state {paths[held[0]]} cannot be read: {error}") from None
 
     def _read_state(self, path: Path) -> dict[str, np.ndarray]:
         try:
@@ -211,9 +211,9 @@ class Fleet:
                 state = {key: data[key] for key in data.files}
             signature = str(state["signature"])
         except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
-            raise CaseError(f"the fiber state {path} cannot be read: {error}") from None
+            raise StateError(f"the fiber state {path} cannot be read: {error}") from None
         if signature != self._signature():
-            raise CaseError(
+            raise StateError(
                 f"{path} holds the families {signature} (name, count, beads, length), "
                 f"constant/fiberProperties says {self._signature()}: "
                 "restore the dictionary, or start afresh"

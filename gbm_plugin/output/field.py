@@ -11,19 +11,17 @@ import numpy as np
 from fluidfoam.readof import OpenFoamFile
 from numpy.typing import NDArray
 
+from ..case.layout import numbered, processors
+
 _ALL_DIGITS = 30  # decimals to which fluidfoam rounds: beyond those of any velocity
 
 
 def latest_time(case: Path | str, field: str) -> str | None:
     """Name of the latest time folder that holds `field`, also in a decomposed case; None if there is none."""
-    case = Path(case)
-    times = []
-    for file in [*case.glob(f"*/{field}*"), *case.glob(f"processor*/*/{field}*")]:
-        if file.name in (field, f"{field}.gz"):
-            try:
-                times.append((float(file.parent.name), file.parent.name))
-            except ValueError:
-                continue
+    folders = [f for root in (Path(case), *processors(Path(case))) for f in numbered(root).items()]
+    times = [
+        (time, path.name) for time, path in folders for end in ("", ".gz") if (path / (field + end)).is_file()
+    ]
     return max(times)[1] if times else None
 
 

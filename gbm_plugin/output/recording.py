@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.layout import numbered
 from ..case.share import all_shares, shared_files
-from ..case.times import as_time
 from .recorder import SCHEMA_VERSION, FamilyRecord, Recorder
 from .restarts import kept
 from .transaction import Transaction
@@ -228,8 +228,8 @@ class _File:
 
 def _by_start(folder: Path) -> list[list[Path]]:
     """The files of each start time in a folder postProcessing/fibers, in their order."""
-    starts = sorted((start, path) for path in folder.iterdir() if (start := as_time(path.name)) is not None)
-    return [files for _, path in starts if (files := shared_files(path, "fibers", ".h5"))]
+    found = (shared_files(path, "fibers", ".h5") for path in numbered(folder).values())
+    return [files for files in found if files]
 
 
 def _with_partners(path: Path) -> list[list[Path]]:

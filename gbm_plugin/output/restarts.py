@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.layout import numbered
+
 # A restart writes its start time again, in as many digits as OpenFOAM's time names have: records closer than
 # this fraction of the interval between records are the same one.
 _SAME_TIME = 1e-3
@@ -25,13 +27,8 @@ def keep_earlier(path: Path) -> Path:
 
 def files_by_start(folder: Path | str, name: str) -> list[Path]:
     """The files ``<folder>/<start time>/<name>``, by increasing start time."""
-    found = []
-    for file in Path(folder).glob(f"*/{name}"):
-        try:
-            found.append((float(file.parent.name), file))
-        except ValueError:
-            continue  # not a start time
-    return [file for _, file in sorted(found)]
+    files = (start / name for start in numbered(Path(folder)).values())
+    return [file for file in files if file.is_file()]
 
 
 def kept(parts: Sequence[NDArray]) -> list[int]:

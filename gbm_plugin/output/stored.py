@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case.dictionary import CaseError
-from ..case.times import is_whole, time_folders
+from ..case.layout import is_whole, processors, time_folders, velocity_file
+from ..errors import CaseError
 from ..flow.stored import LOCATIONS, StoredFlow
 from .field import read_velocity
 
@@ -49,8 +49,8 @@ def case_flow(
 
 def _refuse_incomplete(case: Path, name: str) -> None:
     """CaseError where the U of a time is missing, or the end of it."""
-    folders = [case / name] if _velocity(case / name) else [p / name for p in case.glob("processor[0-9]*")]
-    files = [_velocity(folder) for folder in folders or [case / name]]
+    folders = [case / name] if velocity_file(case / name) else [p / name for p in processors(case)]
+    files = [velocity_file(folder) for folder in folders or [case / name]]
     if None in files:
         raise CaseError(f"time {name} has no U in {(folders or [case / name])[files.index(None)]}: {_REMEDY}")
     for file in files:
@@ -61,14 +61,10 @@ def _refuse_incomplete(case: Path, name: str) -> None:
 _REMEDY = "remove this time folder, or write it again"
 
 
-def _velocity(folder: Path) -> Path | None:
-    return next((folder / u for u in ("U", "U.gz") if (folder / u).is_file()), None)
-
-
 def _time(case: Path, name: str) -> float:
     """The time of a folder, of whose digits the name may have too few."""
-    for folder in (case / name, case / "processor0" / name):
-        file = folder / "uniform/time"
+    for folder in (case, *processors(case)[:1]):
+        file = folder / name / "uniform/time"
         if file.is_file():
             value = re.search(r"^value\s+(\S+);", file.read_text(errors="replace"), flags=re.MULTILINE)
             if value and np.isclose(float(value[1]), float(name), rtol=1e-4, atol=0):

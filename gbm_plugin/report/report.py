@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.layout import FLOW, FLOW_TABLE, results
 from ..output.field import box_mesh, latest_time, read_velocity, vorticity_magnitude
 from ..output.recording import Recording, open_recording
 from ..output.tables import read_dat
@@ -48,7 +49,7 @@ def report(case_dir: Path | str) -> dict:
     folder = case / "report"
     with styled():
         table = _attempt(key, "k and ε against time", _flow, case, folder, key)
-        recording = _attempt(key, "fibers", open_recording, case / "postProcessing" / "fibers")
+        recording = _attempt(key, "fibers", open_recording, results(case))
         try:
             field = _attempt(key, "E(k)", _spectrum, case, folder, key, table, recording)
             if recording is not None and len(recording.times):
@@ -78,7 +79,7 @@ def _attempt(key: dict, what: str, function, *arguments):
 
 
 def _flow(case: Path, folder: Path, key: dict) -> dict[str, NDArray]:
-    table = read_dat(case / "postProcessing" / "linearForcing", "linearForcing.dat")
+    table = read_dat(results(case, FLOW), FLOW_TABLE)
     if not len(table["Time"]):
         raise ValueError("linearForcing.dat has no lines")
     key["not_drawn"] += [

@@ -14,16 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
-from ..case.dictionary import CaseError
 from ..case.initial import write_velocity
+from ..case.layout import STATE_FILE, results
 from ..case.scene import Scene
-from ..case.times import STATE_FILE, Start
-from ..coupling.daemon import family_record
+from ..case.times import Start
+from ..errors import CaseError, RunError
 from ..fleet.fleet import Fleet
-from ..fleet.steptable import StepTable
-from ..output.recording import Recorder
-from ..output.restarts import keep_earlier
+from ..fleet.journal import Journal
 from .progress import Progress
 
 log = logging.getLogger(__name__)
@@ -68,7 +65,7 @@ def results_folder(case: Path, name: str) -> Path:
             if not (folder / part).exists():
                 os.symlink(Path("..") / part, folder / part)
     except OSError as error:
-        raise CaseError(f"cannot write in {folder}: {error.strerror}") from None
+        raise RunError(f"cannot write in {folder}: {error.strerror}") from None
     return folder
 
 
@@ -89,23 +86,11 @@ class Run:
             carrier.restore(folder)
             self.fleet.restore(folder)
             log.info("flow and fibers continue from %s", folder / STATE_FILE)
-        self._open_outputs(_name(start.time))
-
-    def _open_outputs(self, name: str) -> None:
-        scene = self.scene
-        fibers = scene.case / "postProcessing/fibers" / name
-        self.recorder = Recorder(
-            keep_earlier(fibers / "fibers.h5"),
-            [family_record(f) for f in scene.families],
-            box_origin=scene.origin,
-            box_size=scene.box,
-            viscosity=scene.dynamic_viscosity,
-            density=scene.density,
-            dictionaries=scene.texts,
-            program_version=__version__,
+        name = _name(start.time)
+        self.journal = Journal(
+            scene, self.fleet, results(scene.case) / name, origin=scene.origin, box=scene.box
         )
-        self.table = StepTable(fibers, scene.families)
-        self.carrier.open(name)
+        carrier.open(name)
 
     def to_the_end(self) -> bool:
         """Up to scene.end_time; False where a signal stopped it before, after the step under way."""
@@ -119,7 +104,6 @@ class Run:
         try:
             with Progress(scene, self.start.time) as progress:
                 self._observe()
-                self._note()
                 while self.step < last:
                     self._advance()
                     stopping = bool(stop) and self.step < last
@@ -130,37 +114,26 @@ class Run:
                     if stopping:
                         return False
         finally:
-            self.recorder.close()
-            self.table.close()
+            self.journal.close()
             self.carrier.close()
             for number, handler in handlers.items():
                 signal.signal(number, handler)
         return True
 
     def _observe(self) -> None:
-        fleet = self.fleet
-        velocity, extra = self.carrier.sample(fleet.positions, fleet.time, fleet.need)
-        fleet.observe(fleet.time, velocity, extra)
-        if not fleet.provisional:
-            self.gap = fleet.check_prediction(velocity, self.step)
+        """The flow at the beads, until their places in this step are final."""
+        fleet, taken = self.fleet, False
+        while not taken:
+            taken = self.journal.take(
+                self.step, *self.carrier.sample(fleet.positions, fleet.time, fleet.need)
+            )
+        self.carrier.note(fleet.time)
 
     def _advance(self) -> None:
         self.step += 1
         self.carrier.advance()
         self.fleet.advance(self.scene.time_step)
-        while self.fleet.provisional:
-            self._observe()
-            self.fleet.correct()
         self._observe()
-        self._note()
-
-    def _note(self) -> None:
-        """The tables' rows of this time, and the record if it is due."""
-        fleet = self.fleet
-        self.carrier.note(fleet.time)
-        self.table.add(fleet.time, self.step, 0.0, 0.0, self.gap, fleet.end_to_end_ratio())
-        if self.step % self.scene.record_interval == 0:
-            self.recorder.append(self.step, fleet.time, fleet.by_family)
 
     def _save(self) -> None:
         """U at the cell centres for whoever reads the folder as a case, then the states, complete with the last."""

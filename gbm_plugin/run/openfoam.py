@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..case.dictionary import CaseError
+from ..case.layout import log_file
 from ..case.lock import DAEMON, RUN, locked
 from ..case.log import summary
 from ..case.openfoam import command, environment, fatal_message
@@ -21,6 +21,7 @@ from ..case.prepare import prepare, ranks_of, reconstruct
 from ..case.scene import Scene, read_scene
 from ..case.share import Share, all_shares
 from ..case.times import choose_start
+from ..errors import CaseError, RunError
 from ..output.restarts import keep_earlier
 from .progress import Progress
 from .standstill import Pulse, kill_session, where_it_stands
@@ -30,10 +31,6 @@ log = logging.getLogger(__name__)
 STOPPED = "stopped on request; everything is written: the same command continues"
 GRACE = 5.0  # how long one side may outlive the other that failed, before it is ended [s]
 FULL = 1 << 20  # a disk with less room may be why OpenFOAM failed [bytes]
-
-
-class RunError(RuntimeError):
-    """A run that did not reach its end: names the cause, the side that failed and its log."""
 
 
 def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> None:
@@ -103,7 +100,7 @@ class _Daemon:
 
     def __init__(self, case: Path, share: Share):
         self.share = share
-        self.log = case / share.name("log.gbmDaemon")
+        self.log = log_file(case, share.name("gbmDaemon"))
         # -P: not a folder gbm_plugin that happens to be here
         self.argv = [sys.executable, "-P", "-m", "gbm_plugin.cli", "daemon", str(case)]
         if share.of > 1:
@@ -127,7 +124,7 @@ class _Processes:
         self.ranks = ranks
         self.start_time = start_time
         self.daemons = [_Daemon(self.case, share) for share in all_shares(scene.coupling.daemons)]
-        self.solver_log = self.case / f"log.{scene.application}"
+        self.solver_log = log_file(self.case, scene.application)
         self.lock = lock
         self.solver: subprocess.Popen | None = None
         self.stopping = 0

@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
+from ..case.layout import FIBERS, FLOW, FLOW_TABLE, RESULTS
+
 TAIL = 4096  # bytes of a table that surely hold its last row
 
 
@@ -39,8 +41,8 @@ class Progress:
     def update(self) -> None:
         if self._bar.disable:
             return
-        flow = newest_row(self._case, "linearForcing/*/linearForcing.dat")
-        fibers = newest_row(self._case, "fibers/*/daemon*.dat")
+        flow = newest_row(self._case, f"{FLOW}/*/{FLOW_TABLE}")
+        fibers = newest_row(self._case, f"{FIBERS}/*/daemon*.dat")
         time = fibers.get("Time", flow.get("Time", self._start))
         parts = []
         if flow:
@@ -53,7 +55,7 @@ class Progress:
 
 def newest_row(case: Path, pattern: str) -> dict[str, float]:
     """The last whole row of the newest table in postProcessing that fits the pattern; empty without one."""
-    tables = sorted(case.glob(f"postProcessing/{pattern}"), key=lambda p: p.stat().st_mtime)
+    tables = sorted((case / RESULTS).glob(pattern), key=lambda p: p.stat().st_mtime)
     if not tables:
         return {}
     with tables[-1].open("rb") as file:

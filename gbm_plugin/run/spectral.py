@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case.dictionary import CaseError
 from ..case.initial import read_initial_field
+from ..case.layout import FLOW, FLOW_TABLE, results
 from ..case.scene import Forcing, Scene
 from ..case.times import choose_start
+from ..errors import CaseError
 from ..output.restarts import keep_earlier
 from ..spectral import EswaranPope, LinearForcing, SpectralSolver
 from ..spectral.interpolation import WORDS
@@ -107,7 +108,7 @@ class _SpectralFlow(Carrier):
         return self.solver.shifted_velocity(0.5)
 
     def open(self, name: str) -> None:
-        path = self.scene.case / "postProcessing/linearForcing" / name / "linearForcing.dat"
+        path = results(self.scene.case, FLOW) / name / FLOW_TABLE
         path.parent.mkdir(parents=True, exist_ok=True)
         self.table = keep_earlier(path).open("w", buffering=1)
         self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case.dictionary import CaseError
 from ..case.scene import Scene
 from ..case.times import choose_start
+from ..errors import CaseError
 from ..flow import StoredFlow, hdf5_flow
 from ..flow.grid import WORDS
 from ..flow.stored import SAME_TIME, refuse_gaps

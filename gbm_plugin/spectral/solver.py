@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gbm_plugin.flow import NEEDS
 from gbm_plugin.spectral import interpolation as interpolate
 from gbm_plugin.spectral.arrays import Array, Arrays
 from gbm_plugin.spectral.forcing import Forcing
@@ -12,7 +13,6 @@ from gbm_plugin.spectral.stepping import AdamsBashforth3, RungeKutta4
 from gbm_plugin.statistics import turbulence
 
 SCHEMES = {"ab3": AdamsBashforth3, "rk4": RungeKutta4}
-NEEDS = ("velocity", "rotation", "gradient")
 
 
 class SpectralSolver:

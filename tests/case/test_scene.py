@@ -8,9 +8,9 @@ import shutil
 import numpy as np
 import pytest
 
-from gbm_plugin.case.dictionary import CaseError
 from gbm_plugin.case.initial import read_initial_field
 from gbm_plugin.case.scene import Coupling, Forcing, Model, read_scene
+from gbm_plugin.errors import CaseError
 
 from conftest import DEFAULT_CASE, HEADER
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gbm_plugin.case.dictionary import CaseError
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.times import Start
+from gbm_plugin.errors import CaseError
 from gbm_plugin.run.driver import Carrier, Run, results_folder
 
 from conftest import make_case

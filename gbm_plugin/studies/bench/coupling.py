@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...case.copies import copy_case
+from ...case.layout import COUPLING_TABLE, daemon_table, results
 from ...case.scene import read_scene
 from ...case.share import all_shares
 from ...output.tables import read_dat
@@ -58,9 +59,9 @@ def run(
         }
         copy_case(case, copy, entries, texts)
         run_case(copy, parallel=ranks > 1)
-        results = copy / "postProcessing/fibers"
-        table = read_dat(results, "coupling.dat")
-        of_daemons = [read_dat(results, share.name("daemon", ".dat")) for share in all_shares(daemons)]
+        folder = results(copy)
+        table = read_dat(folder, COUPLING_TABLE)
+        of_daemons = [read_dat(folder, daemon_table(share)) for share in all_shares(daemons)]
     parts = {name: float(np.median(table[name][START:])) for name in PARTS}
     step = float(np.median(np.diff(table["sentAt"])[START:]))
     busy = [np.median((d["sentAt"][1:] - d["arrivedAt"][:-1])[START:]) for d in of_daemons]

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.times import as_time
+from ...case.layout import FLOW, FLOW_TABLE, as_time
+from ...case.layout import results as results_of
 from ...output.field import read_velocity
 from ...output.recording import open_recording
 from ...output.tables import read_dat
@@ -58,7 +59,7 @@ class Averages:
 def averages(results: Path, cells: int, box: float, viscosity: float, since: float, highest: int) -> Averages:
     """Averages over all that is later than `since` [s]; spectra up to `highest` waves per box. Raises
     ValueError where that is too short for an error."""
-    table = read_dat(results / "postProcessing/linearForcing", "linearForcing.dat")
+    table = read_dat(results_of(results, FLOW), FLOW_TABLE)
     late = table["Time"] > since
     numbers = {name: _mean(table[column][late]) for name, column in TABLE.items()}
     lost = _mean((table["epsilonBudget"] - table["epsilonLaplacian"])[late])
@@ -73,7 +74,7 @@ def averages(results: Path, cells: int, box: float, viscosity: float, since: flo
     spectra = [energy_spectrum(u, box) for u in fields]
 
     curvature = {}
-    with open_recording(results / "postProcessing/fibers") as recording:
+    with open_recording(results_of(results)) as recording:
         kept = recording.times > since
         for name, family in recording.families.items():
             positions, length = family.positions[kept], 2 * family.radius * family.beads

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...case.copies import HEADER
 from ...case.dictionary import Dictionary
+from ...case.layout import results
 from ...output.field import read_velocity
 from ...output.recording import open_recording
 from ...run.openfoam import run as run_openfoam
@@ -92,7 +93,7 @@ def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str) -> 
     (run_spectral if spectral else run_openfoam)(copy)
     folder = copy / "spectral" if spectral else copy
     velocity = read_velocity(folder, f"{END_TIME:g}", (cells,) * 3)
-    with open_recording(folder / "postProcessing/fibers") as recording:
+    with open_recording(results(folder)) as recording:
         ends = {
             name: family.positions[-1][:, [0, -1]] / (2 * family.radius * family.beads)
             for name, family in recording.families.items()

@@ -18,11 +18,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.copies import copy_case
+from ...case.layout import FLOW, FLOW_TABLE, results
 from ...case.scene import read_scene
+from ...errors import RunError
 from ...flow.stored import POINTS_IN_TIME
 from ...output.recording import open_recording
 from ...output.tables import read_dat
-from ...run.openfoam import STOPPED, RunError
+from ...run.openfoam import STOPPED
 from ...run.openfoam import run as run_openfoam
 from ...run.stored import run_stored
 from ..figures import replay_figure
@@ -112,7 +114,7 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
 
 
 def _kolmogorov_time(live: Path) -> float:
-    table = read_dat(live / "postProcessing/linearForcing", "linearForcing.dat")
+    table = read_dat(results(live, FLOW), FLOW_TABLE)
     return float(np.sqrt(read_scene(live).viscosity / np.mean(table["epsilonBudget"])))
 
 
@@ -123,8 +125,8 @@ def _distances(live: Path, in_time: str, every: int) -> dict[str, float]:
         raise RunError(STOPPED)
     result = {}
     with (
-        open_recording(live / "postProcessing/fibers") as a,
-        open_recording(live / "stored/postProcessing/fibers") as b,
+        open_recording(results(live)) as a,
+        open_recording(results(live / "stored")) as b,
     ):
         if abs(a.times[-1] - b.times[-1]) > 1e-6 * scene.time_step:
             raise RunError(f"the replay ended at {b.times[-1]:g}, the run at {a.times[-1]:g}")

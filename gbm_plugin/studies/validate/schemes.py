@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from ...case.layout import log_file
 from ...report.style import COLOURS, new_figure
 from ..scenes import checked_cells, checked_step
 from . import comparison
@@ -175,7 +176,11 @@ class _Mesh:
         copy = self._copy()
         comparison.make(self.case, copy, self.cells, steps, changes=setting.changes)
         state = comparison.run(copy, self.cells, steps, "openfoam", setting.interpolation or self.word)
-        times = re.findall(r"^ExecutionTime = (\S+) s", (copy / "log.pimpleFoam").read_text(), re.MULTILINE)
+        times = re.findall(
+            r"^ExecutionTime = (\S+) s",
+            log_file(copy, comparison.application(copy)).read_text(),
+            re.MULTILINE,
+        )
         return state, (float(times[-1]) - float(times[0])) / (len(times) - 1)
 
 

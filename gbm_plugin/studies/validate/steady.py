@@ -20,6 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ...case.layout import results
 from ...fiber import Fibers, Stepper, simulate
 from ...flow import ABC
 from ...output.field import read_velocity
@@ -128,7 +129,7 @@ def _solve(case: Path | str, folder: Path, cells: int, steps: int) -> _Run:
     )
     run_openfoam(copy)
     velocity = read_velocity(copy, f"{END_TIME:g}", (cells, cells, cells))
-    with open_recording(copy / "postProcessing/fibers") as recording:
+    with open_recording(results(copy)) as recording:
         viscosity = recording.metadata["viscosity"]
         families = recording.families.items()
         start = {name: Fibers(f.positions[0], f.bending_stiffness, viscosity) for name, f in families}
