@@ -8,7 +8,7 @@ import json
 import logging
 import signal
 import sys
-from importlib import import_module
+from collections.abc import Sequence
 from pathlib import Path
 
 from . import __version__
@@ -16,19 +16,12 @@ from .errors import GbmError
 
 # what is said in one line: the rest is a fault of the program, with its traceback
 EXPECTED = (GbmError, ValueError, OSError, FloatingPointError)
-
-STUDIES = {  # modules of validation/, each with run, table and draw
-    "convergence": "errors of flow and fibers as cells and step shrink (default)",
-    "schemes": "which of OpenFOAM's schemes have the least error for their time",
-    "stationary": "averages of forced turbulence in both engines, with standard errors (20 min)",
-    "steady": "fibers in an ABC flow against the analytic one",
-    "replay": "distance of fibers in stored fields to the coupled run, by the interval between fields",
-}
+COMMON = {"action", "command", "study", "csv", "figure", "json"}  # not of a study itself
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = _parser()
-    arguments = parser.parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    arguments = _parser(words).parse_args(words)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
     try:
@@ -52,7 +45,7 @@ def _failed(command: str, problem: str) -> int:
     return 1
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="gbm", description="Long flexible fibers in turbulence, in OpenFOAM."
     )
@@ -110,60 +103,9 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("info", _info, "Say what a case contains and whether the fiber model holds in it. SI units.")
     add_case(sub)
     _add_json(sub)
-    sub = add("validate", _validate, "Judge OpenFOAM with a case's schemes by the spectral solver.")
-    add_case(sub)
-    sub.add_argument(
-        "--study",
-        choices=STUDIES,
-        default="convergence",
-        help="; ".join(f"{name}: {text}" for name, text in STUDIES.items()),
-    )
-    sub.add_argument("--cells", type=int, nargs="+", help="in each direction (default: as the study needs)")
-    sub.add_argument(
-        "--time-step",
-        type=float,
-        help="of the first mesh; finer ones take it in proportion, those of steady as it is [s]",
-    )
-    sub.add_argument("--figure", metavar="PNG", help="also draw the result")
-    sub.add_argument("--csv", metavar="FILE", help="also write the table, unrounded")
-    _add_json(sub)
-
-    sub = add("bench", None, "Measure speed beside error; ratios within one run.")
-    kinds = sub.add_subparsers(dest="kind", required=True, metavar="KIND")
-
-    kind = kinds.add_parser("coupling", help="what the coupling costs a step of OpenFOAM")
-    kind.set_defaults(action=_bench_coupling)
-    add_case(kind)
-    kind.add_argument("--cells", type=int, default=64, help="cells in each direction (default: 64)")
-    kind.add_argument("--fibers", type=int, default=1000, help="(default: 1000)")
-    kind.add_argument("--beads", type=int, default=20, help="of each fiber (default: 20)")
-    kind.add_argument("--steps", type=int, default=30, help="(default: 30)")
-    kind.add_argument(
-        "--transport", choices=("socket", "tcp", "file"), default="socket", help="(default: socket)"
-    )
-    kind.add_argument("--ranks", type=int, default=1, help="of OpenFOAM, in slabs (default: 1)")
-    kind.add_argument("--daemons", type=int, default=1, help="that share the fibers (default: 1)")
-    _add_json(kind)
-
-    kind = kinds.add_parser(
-        "fibers", help="bead-steps per second of the integrators, and time to an accuracy"
-    )
-    kind.set_defaults(action=_bench_fibers)
-    kind.add_argument("--fibers", type=int, default=1000, help="(default: 1000)")
-    kind.add_argument("--beads", type=int, default=20, help="of each fiber (default: 20)")
-    kind.add_argument("--quick", action="store_true", help="without the large batches")
-    _add_json(kind)
-
-    kind = kinds.add_parser(
-        "spectral", help="a right-hand side of the spectral solver, beside fluidsim if there"
-    )
-    kind.set_defaults(action=_bench_spectral)
-    kind.add_argument("--cells", type=int, default=128, help="in each direction (default: 128)")
-    kind.add_argument("--threads", type=int, default=1, help="(default: 1)")
-    kind.add_argument(
-        "--fluidsim", metavar="PYTHON", default=sys.executable, help="interpreter that has fluidsim"
-    )
-    _add_json(kind)
+    sub = add("study", _study, "Measure and compare; without a name, the list of studies.")
+    if words[:1] == ["study"]:
+        _add_studies(sub, words)
     return parser
 
 
@@ -211,47 +153,44 @@ def _info(arguments) -> dict:
     return result
 
 
-def _validate(arguments) -> dict:
-    study = import_module(f".studies.validate.{arguments.study}", __package__)
-    given = {name: getattr(arguments, name) for name in ("cells", "time_step")}
-    result = study.run(arguments.case, **{name: value for name, value in given.items() if value is not None})
+def _add_studies(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
+    """A parser for each study; only those that the command line names are imported for their arguments."""
+    from .studies.study import find_studies
+
+    names = parser.add_subparsers(dest="study", metavar="NAME")
+    for name, study in find_studies().items():
+        sub = names.add_parser(name, help=study.title, description=study.title)
+        if name in words:
+            study.load().add_arguments(sub)
+            sub.add_argument("--csv", metavar="FILE", help="also write the numbers, unrounded")
+            sub.add_argument("--figure", metavar="PNG", help="also draw the result")
+            _add_json(sub)
+
+
+def _study(arguments) -> dict | None:
+    from .studies.study import find_studies, listing
+
+    studies = find_studies()
+    if arguments.study is None:
+        print(listing(studies))
+        return None
+    study = studies[arguments.study].load()
+    options = {name: value for name, value in vars(arguments).items() if name not in COMMON}
+    if arguments.figure and not hasattr(study, "draw"):
+        raise ValueError(f"--figure: the study {arguments.study} has no picture")
+    result = study.run(**options)
     print(study.table(result))
+    if arguments.csv:
+        with open(arguments.csv, "w", newline="") as file:
+            rows = study.rows(result)
+            writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
+            writer.writeheader()
+            writer.writerows(rows)
     if arguments.figure:
         from .report.style import styled
 
         with styled():
             study.draw(result).savefig(arguments.figure)
-    if arguments.csv:
-        with open(arguments.csv, "w", newline="") as file:
-            rows = result["rows"] + result.get("temporal_rows", [])
-            writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
-            writer.writeheader()
-            writer.writerows(rows)
-    return result
-
-
-def _bench_coupling(arguments) -> dict:
-    from .studies.bench import coupling
-
-    names = ("cells", "fibers", "beads", "steps", "transport", "ranks", "daemons")
-    result = coupling.run(arguments.case, **{name: getattr(arguments, name) for name in names})
-    print(coupling.table(result))
-    return result
-
-
-def _bench_fibers(arguments) -> dict:
-    from .studies.bench import fibers
-
-    result = fibers.run(arguments.fibers, arguments.beads, quick=arguments.quick)
-    print(fibers.table(result))
-    return result
-
-
-def _bench_spectral(arguments) -> dict:
-    from .studies.bench import spectral
-
-    result = spectral.run(arguments.cells, arguments.threads, fluidsim_python=arguments.fluidsim)
-    print(spectral.table(result))
     return result
 
 

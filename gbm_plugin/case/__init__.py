@@ -1,0 +1,1 @@
+"""An OpenFOAM case read into one typed scene: its layout, dictionaries, initial fields, preparation."""

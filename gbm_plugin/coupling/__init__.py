@@ -1,0 +1,1 @@
+"""The protocol between OpenFOAM and the fiber daemon: messages, transports, the daemon."""

@@ -1,0 +1,1 @@
+"""All fibers of a scene moved as one, and the journal of their run."""

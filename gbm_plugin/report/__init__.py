@@ -1,0 +1,1 @@
+"""What a person looks at: figures, pictures, ParaView series, the page of a run."""

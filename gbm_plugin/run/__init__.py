@@ -1,0 +1,1 @@
+"""A scene run, once for each way: OpenFOAM and daemon, the spectral solver, stored fields."""

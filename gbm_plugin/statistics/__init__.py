@@ -1,0 +1,1 @@
+"""Statistics of fibers and turbulence, with errors that know correlation in time."""

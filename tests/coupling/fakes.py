@@ -17,7 +17,7 @@ import numpy as np
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.share import Share
-from gbm_plugin.coupling.channel import listen
+from gbm_plugin.coupling.listen import listen
 from gbm_plugin.coupling.message import Hello, Kind, Message, encode_array, encode_header, encode_welcome
 
 from conftest import start_solver

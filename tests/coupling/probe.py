@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gbm_plugin.case.scene import read_scene
-from gbm_plugin.coupling.channel import listen
+from gbm_plugin.coupling.listen import listen
 from gbm_plugin.coupling.message import (
     Hello,
     Kind,

@@ -1,1 +1,1 @@
-"""Benchmarks behind `gbm bench`."""
+"""Speed beside error; ratios within one run."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from ...case.scene import read_scene
 from ...case.share import all_shares
 from ...output.tables import read_dat
 from ...run.openfoam import run as run_case
+from ..study import option
 
 FIBERS = """coupling {{ transport {transport}; daemons {daemons}; }}
 recordInterval {never};
@@ -25,6 +27,17 @@ simpleCoeffs {{ n (1 1 {ranks}); delta 0.001; }}
 """
 PARTS = ("wait", "location", "sampling", "sending")  # columns of coupling.dat
 START = 5  # the first steps are corrected, and compile
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case that is copied (default: this folder)")
+    option(parser, run, "cells", "in each direction")
+    option(parser, run, "fibers", "how many")
+    option(parser, run, "beads", "of each fiber")
+    option(parser, run, "steps", "of OpenFOAM")
+    option(parser, run, "transport", "how the two sides talk", choices=("socket", "tcp", "file"))
+    option(parser, run, "ranks", "of OpenFOAM, in slabs")
+    option(parser, run, "daemons", "that share the fibers")
 
 
 def run(
@@ -80,6 +93,11 @@ def run(
         "positions_bytes": 24 * fibers * beads,
         "sample_bytes": 48 * fibers * beads,
     }
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return [result]
 
 
 def table(result: dict) -> str:

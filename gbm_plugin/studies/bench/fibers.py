@@ -5,6 +5,7 @@ Processor time for one thread, wall time where two are compared; the best of sev
 
 from __future__ import annotations
 
+import argparse
 import time
 
 import numba
@@ -12,6 +13,8 @@ import numpy as np
 
 from gbm_plugin.fiber import Fibers, simulate
 from gbm_plugin.flow import TaylorGreen
+
+from ..study import option
 
 VISCOSITY = 1e-3
 
@@ -99,6 +102,13 @@ def time_to_accuracy(end=2.0) -> dict:
     }
 
 
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "fibers", "how many")
+    option(parser, run, "beads", "of each fiber")
+    option(parser, run, "repeats", "of which the best counts")
+    option(parser, run, "quick", "without the large batches")
+
+
 def run(fibers=1000, beads=20, repeats=3, quick=False) -> dict:
     """All measurements, quick without the long ones; on one thread except where two are compared."""
     threads = numba.get_num_threads()
@@ -139,6 +149,13 @@ def run(fibers=1000, beads=20, repeats=3, quick=False) -> dict:
     return result
 
 
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    found = [{"case": name, "threads": 1} | row for name, row in result["speed"].items()]
+    found += [{"case": name, "two_threads_over_one": ratio} for name, ratio in result["threads"].items()]
+    return found + [{"case": name} | row for name, row in result["accuracy"].items()]
+
+
 def table(result) -> str:
     """The result of run as text."""
     lines = [f"{'case (one thread)':34s} {'M bead-steps/s':>14s} {'sampling':>9s} {'refined':>8s}"]
@@ -151,7 +168,3 @@ def table(result) -> str:
     for name, row in result.get("accuracy", {}).items():
         lines.append(f"{name:34s} {row['seconds']:14.4f} {row['error_over_length']:9.1e}")
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(table(run()))

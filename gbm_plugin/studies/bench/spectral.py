@@ -6,6 +6,7 @@ so that what else the machine does meets all of them, and the best of their turn
 in double precision: it is the measure for both of ours.
 """
 
+import argparse
 import os
 import subprocess
 import sys
@@ -16,6 +17,8 @@ import numpy as np
 import pyfftw
 
 from gbm_plugin.spectral import SpectralSolver
+
+from ..study import option
 
 PEER = """
 import os, sys, time
@@ -83,6 +86,13 @@ class Fluidsim:
         self._process.wait()
 
 
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "cells", "in each direction")
+    option(parser, run, "threads", "of the solver")
+    option(parser, run, "repeats", "of which the best counts")
+    option(parser, run, "fluidsim_python", "interpreter that has fluidsim", metavar="PYTHON")
+
+
 def run(cells: int = 128, threads: int = 1, repeats: int = 9, fluidsim_python: str = sys.executable) -> dict:
     """Times in seconds, shares and bytes, for double and single precision.
 
@@ -117,6 +127,11 @@ def run(cells: int = 128, threads: int = 1, repeats: int = 9, fluidsim_python: s
             "times_faster_than_fluidsim": best["fluidsim"] / best[precision] if peer else None,
         }
     return result
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return [{"cells": result["cells"], "precision": p} | result[p] for p in ("double", "single")]
 
 
 def table(result: dict) -> str:

@@ -1,1 +1,1 @@
-"""The coupling judged by the spectral solver, by analytic flows and by its own limits: `gbm validate`."""
+"""The coupling and its engines judged: by each other, by analytic flows, by averages."""

@@ -1,10 +1,11 @@
-"""`gbm validate --study convergence`: one case in both engines at several resolutions.
+"""One case in both engines at several resolutions.
 
 How fast OpenFOAM and its fibers converge to the spectral solver, which resolves the same initial modes exactly.
 """
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 import time
 from collections.abc import Sequence
@@ -14,8 +15,16 @@ from matplotlib.figure import Figure
 
 from ..figures import convergence_figure
 from ..scenes import checked_cells, checked_step, observed_orders, order_lines
+from ..study import option
 from . import comparison
 from .comparison import END_TIME, VISCOSITY
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case whose schemes are judged (default: this folder)")
+    option(parser, run, "cells", "in each direction, one mesh after the other")
+    option(parser, run, "time_step", "of the coarsest mesh, others in proportion [s]")
+    option(parser, run, "seed", "of the initial field")
 
 
 def run(
@@ -55,6 +64,11 @@ def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
     }
     fibers = comparison.fiber_distance(ours, reference)
     return result | {f"{family}_error": error for family, error in fibers.items()}
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"]
 
 
 def table(result: dict) -> str:

@@ -1,4 +1,4 @@
-"""`gbm validate --study replay`: fibers in stored fields against those of the coupled run that stored them.
+"""Fibers in stored fields against those of the coupled run that stored them.
 
 One run of OpenFOAM writes every step of developed turbulence; replays then take every field, every second one, ...
 How often must a run write its flow for fibers that are added later?
@@ -6,6 +6,7 @@ How often must a run write its flow for fibers that are added later?
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import math
 import shutil
@@ -28,6 +29,7 @@ from ...run.openfoam import STOPPED
 from ...run.openfoam import run as run_openfoam
 from ...run.stored import run_stored
 from ..figures import replay_figure
+from ..study import option
 
 NOBODY = """families { one { count 1; beads 2; length 0.1; bendingStiffness 0; } }
 """
@@ -41,6 +43,14 @@ families
     soft {{ count 50; beads 20; length 1.5; bendingStiffness 1e-5; seed 3; }}
 }}
 """
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case whose flow is taken (default: this folder)")
+    option(parser, run, "cells", "in each direction; one number")
+    option(parser, run, "time_step", "of the run that is stored [s]")
+    option(parser, run, "steps", "of that run; a power of two")
+    option(parser, run, "development", "least time before it, without fibers [s]")
 
 
 def run(
@@ -149,6 +159,11 @@ def _orders(rows: list[dict]) -> list[dict]:
         order = {name: float(np.log(coarse[name] / fine[name]) / ratio) for name in names}
         orders.append({"in_time": fine["in_time"], "every": [fine["every"], coarse["every"]], **order})
     return orders
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"]
 
 
 def table(result: dict) -> str:

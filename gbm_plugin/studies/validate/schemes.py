@@ -1,4 +1,4 @@
-"""`gbm validate --study schemes`: which of OpenFOAM's schemes have the least error for their time.
+"""Which of OpenFOAM's schemes have the least error for their time.
 
 Around the schemes and correctors of a case, one after the other is changed, and some together. Every setting is of
 second order in mesh and step at best, so an error E at the cost C becomes E (C/C0)^(1/2) on the mesh that brings the
@@ -8,6 +8,7 @@ that. The error in time by itself is the distance from the same mesh at a step s
 
 from __future__ import annotations
 
+import argparse
 import re
 import tempfile
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from ...case.layout import log_file
 from ...report.style import COLOURS, new_figure
 from ..scenes import checked_cells, checked_step
+from ..study import option
 from . import comparison
 from .comparison import END_TIME, State
 
@@ -101,6 +103,13 @@ SETTINGS = {
     "fibers cellPoint": Setting(interpolation="cellPoint", steps=(2,), same_space=False),
     "fibers cellPointFace": Setting(interpolation="cellPointFace", steps=(2,), same_space=False),
 }
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case around whose schemes others are tried (default: this folder)")
+    option(parser, run, "cells", "in each direction")
+    option(parser, run, "time_step", "the longest, of the first mesh [s]")
+    option(parser, run, "settings", "names of settings (default: all)", metavar="NAME")
 
 
 def run(
@@ -201,6 +210,11 @@ def _orders(rows: list[dict]) -> list[dict]:
         order = {n: float(np.log(coarse[n] / fine[n]) / ratio) for n in ("velocity_in_time", "fiber_in_time")}
         orders.append({"cells": key[0], "setting": key[1], "time_step": fine["time_step"]} | order)
     return orders
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"]
 
 
 def table(result: dict) -> str:

@@ -1,10 +1,11 @@
-"""`gbm validate --study stationary`: both engines driven to the same stationary state for many turnovers.
+"""Both engines driven to the same stationary state for many turnovers.
 
 Chaos parts the two flows within a few turnovers, so they are compared by averages with standard errors.
 """
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import os
 import tempfile
@@ -19,6 +20,7 @@ from ...run.openfoam import run as run_openfoam
 from ...run.openfoam import run_spectral
 from ..figures import stationary_figure
 from ..scenes import checked_cells, checked_step, scene_copy
+from ..study import option
 from .averages import BLOCKS, Averages, averages, curve, density
 from .comparison import sampling_word
 
@@ -46,6 +48,14 @@ RECORDS = 7  # of the fibers in a turnover
 BOX = 2 * np.pi
 SAMPLING = {"spectral": "cubic", "spectral trilinear": "trilinear"}  # of the flow at the beads
 BINS = 14  # of the mean curvature
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case whose schemes are judged (default: this folder)")
+    option(parser, run, "cells", "in each direction, of OpenFOAM")
+    option(parser, run, "time_step", "of the first mesh, others in proportion [s]")
+    option(parser, run, "reference_cells", "of the spectral solver")
+    option(parser, run, "turnovers", "k/eps long each, after which averages end")
 
 
 def run(
@@ -198,6 +208,11 @@ def solve(case: Path, folder: Path, engine: str, cells: int, time_step: float, t
     )
     (run_openfoam if engine == "openfoam" else run_spectral)(copy)
     return copy if engine == "openfoam" else copy / "spectral"
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"]
 
 
 def table(result: dict) -> str:

@@ -1,4 +1,4 @@
-"""`gbm validate --study steady`: an ABC flow held in OpenFOAM, and fibers whose paths in it are known.
+"""An ABC flow held in OpenFOAM, and fibers whose paths in it are known.
 
 linearForcing with A = νk² balances the viscosity of this Beltrami flow exactly; of the two modes it is the one
 that needs no adaptation to the mesh, where the Laplacian is weaker by (kh)²/12 (constantPower would let the
@@ -10,6 +10,7 @@ Pouquet, Geophys. Astrophys. Fluid Dyn. 66, 183, 1992).
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import tempfile
 from collections.abc import Sequence
@@ -28,6 +29,7 @@ from ...output.recording import open_recording
 from ...run.openfoam import run as run_openfoam
 from ..figures import orders_figure
 from ..scenes import checked_cells, checked_step, ends_apart, observed_orders, order_lines, rms, scene_copy
+from ..study import option
 from .comparison import sampling_word
 
 AMPLITUDES = (1.0, 0.8, 0.6)
@@ -49,6 +51,13 @@ families
 VISCOSITY = 0.2
 END_TIME = 2.4  # fibers turn and bend through more than a radian
 REFERENCE = {"time_step": 0.02, "tolerance": 1e-8}  # of `simulate`: ab3 agrees with it to 4e-6 of the length
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case whose schemes are judged (default: this folder)")
+    option(parser, run, "cells", "in each direction, one mesh after the other")
+    option(parser, run, "time_step", "of all meshes, and the shortest in time [s]")
+    option(parser, run, "halvings", "of the longest step")
 
 
 def run(
@@ -167,6 +176,11 @@ def _extrapolation(start: dict[str, Fibers], reference: dict[str, NDArray], time
             stepper.correct()
         observe()
     return ends_apart(stepper.positions, reference[name], fibers.radius)
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"] + result["temporal_rows"]
 
 
 def table(result: dict) -> str:

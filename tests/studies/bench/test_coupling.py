@@ -1,4 +1,4 @@
-"""`gbm bench coupling` on real processes: what it says of the runs that it makes."""
+"""`gbm study coupling` on real processes: what it says of the runs that it makes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from conftest import DEFAULT_CASE, gbm
 def test_shares_of_a_step(tmp_path, ranks, daemons):
     file = tmp_path / "bench.json"
     sizes = ("--cells", 24, "--fibers", 6, "--beads", 5, "--steps", 9, "--ranks", ranks, "--daemons", daemons)
-    done = gbm("bench", "coupling", DEFAULT_CASE, *sizes, "--json", file)
+    done = gbm("study", "coupling", DEFAULT_CASE, *sizes, "--json", file)
     assert done.returncode == 0, done.stderr
     result = json.loads(file.read_text())
     parts = [result[name] for name in ("wait", "location", "sampling", "sending")]

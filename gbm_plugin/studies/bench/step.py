@@ -1,10 +1,6 @@
-#!/usr/bin/env python3
 """Where the time of a step of OpenFOAM goes: the default case beside the best of OpenFOAM's own solvers.
 
-    PYTHONPATH=. tools/benchmark_step [--cells 32 64] [--ranks 1 2] [--steps 5] [--repeats 3]
-                                      [--only WORD ...] [--processor-time] [--csv FILE]
-
-The default case without fibers. OpenFOAM's profiling is written at every step; the settings take turns, and
+The case without fibers. OpenFOAM's profiling is written at every step; the settings take turns, and
 each time is the smallest of all steps but the first, so that what else the machine does is left out.
 --processor-time leaves out also the time in which the process did not run; it is for one rank.
 """
@@ -12,22 +8,21 @@ each time is the smallest of all steps but the first, so that what else the mach
 from __future__ import annotations
 
 import argparse
-import csv
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from gbm_plugin.case.openfoam import command, environment, utility
-from gbm_plugin.case.prepare import initial_fields
-from gbm_plugin.case.scene import read_scene
-
-DEFAULT_CASE = Path(__file__).resolve().parents[1] / "openfoam_case"
-HEADER = "FoamFile { version 2.0; format ascii; class dictionary; object dictionary; }\n"
+from ...case.copies import HEADER
+from ...case.openfoam import command, environment, utility
+from ...case.prepare import initial_fields
+from ...case.scene import read_scene
+from ..study import option
+from ..study import steps as study_steps
 
 FFT = "solver PCG; preconditioner periodicFFT;"
 GAMG = "solver GAMG; smoother {};"
@@ -65,7 +60,8 @@ class Setting:
         viscous = "div((nuEff*dev2(T(grad(U))))) Gauss linear;"
         pressure = "linear" if self.cubic == "linear" else "cubic"
         schemes.write_text(
-            HEADER + f"""ddtSchemes {{ default backward; }}
+            HEADER
+            + f"""ddtSchemes {{ default backward; }}
             gradSchemes {{ default Gauss linear; grad(p) Gauss {pressure}; }}
             divSchemes {{ default none; div(phi,U) Gauss {self.cubic}; {viscous} }}
             laplacianSchemes {{ default Gauss linear orthogonal; }}
@@ -119,13 +115,12 @@ std::chrono::system_clock::time_point std::chrono::system_clock::now() noexcept
 """
 
 PARTS = ("step", "pressure", "momentum", "forcing", "rest")
-COLUMNS = ("cells", "ranks", "setting", *PARTS, "iterations", "continuity")
 
 
-def make_case(path: Path, cells: int, ranks: int, steps: int) -> None:
-    """The default case with this many cells, no fibers, and profiling written at every step."""
+def make_case(case: Path, path: Path, cells: int, ranks: int, steps: int) -> None:
+    """The case with this many cells, no fibers, and profiling written at every step."""
     for folder in ("0.orig", "constant", "system"):
-        shutil.copytree(DEFAULT_CASE / folder, path / folder, ignore=shutil.ignore_patterns("polyMesh"))
+        shutil.copytree(case / folder, path / folder, ignore=shutil.ignore_patterns("polyMesh"))
     time_step = 0.64 / cells  # the same Courant number on every mesh
     block = path / "system/blockMeshDict"
     block.write_text(re.sub(r"^n .*?;", f"n {cells};", block.read_text(), flags=re.M))
@@ -170,7 +165,7 @@ def process_clock(folder: Path) -> Path:
     return library
 
 
-def run(path: Path, ranks: int, setting: Setting, clock: Path | None) -> dict[str, float | str]:
+def measure(path: Path, ranks: int, setting: Setting, clock: Path | None) -> dict[str, float | str]:
     """Smallest times [ms] of a step and its solves; iterations and continuity error of the last step."""
     setting.write(path)
     root = path / "processor0" if ranks > 1 else path
@@ -195,54 +190,59 @@ def run(path: Path, ranks: int, setting: Setting, clock: Path | None) -> dict[st
     }
 
 
-def main() -> None:
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
-    parser.add_argument("--cells", type=int, nargs="+", default=[32, 64])
-    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--steps", type=int, default=5)
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--only", nargs="+", help="settings whose names begin with one of these")
-    parser.add_argument("--processor-time", action="store_true")
-    parser.add_argument("--csv", type=Path)
-    args = parser.parse_args()
-    if args.processor_time and args.ranks != [1]:
-        sys.exit(
-            "benchmark_step: --processor-time is for --ranks 1: ranks that wait use the processor, too"
-        )
-    names = [n for n in SETTINGS if not args.only or n.startswith(tuple(args.only))]
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case of pimpleFoam (default: this folder)")
+    option(parser, run, "cells", "in each direction, one mesh after the other")
+    option(parser, run, "ranks", "of OpenFOAM, in slabs")
+    option(parser, run, "steps", "of each run")
+    option(parser, run, "repeats", "of which the best counts")
+    option(parser, run, "only", "settings whose names begin with one of these (default: all)", metavar="WORD")
+    option(parser, run, "processor_time", "without the time in which the process did not run; for one rank")
+
+
+def run(
+    case: Path | str,
+    cells: Sequence[int] = (32, 64),
+    ranks: Sequence[int] = (1, 2),
+    steps: int = 5,
+    repeats: int = 3,
+    only: Sequence[str] = ("",),
+    processor_time: bool = False,
+) -> dict:
+    """Smallest times [ms] of a step and its parts, for each mesh, number of ranks and setting."""
+    if processor_time and list(ranks) != [1]:
+        raise ValueError("--processor-time is for --ranks 1: ranks that wait use the processor, too")
+    names = [n for n in SETTINGS if n.startswith(tuple(only))]
     if not names:
-        sys.exit(f"benchmark_step: --only {args.only} is none of {', '.join(SETTINGS)}")
-
+        raise ValueError(f"--only {' '.join(only)} is none of {', '.join(SETTINGS)}")
     rows = []
-    print(f"{'cells':>5} {'ranks':>5} {'setting':32} {' '.join(f'{part:>8}' for part in PARTS)} [ms]")
-    for cells in args.cells:
-        for ranks in args.ranks:
-            with tempfile.TemporaryDirectory() as folder:
-                path = Path(folder) / "case"
-                make_case(path, cells, ranks, args.steps)
-                clock = process_clock(Path(folder)) if args.processor_time else None
-                best: dict[str, dict] = {}
-                for _ in range(args.repeats):
-                    for name in names:
-                        new, old = run(path, ranks, SETTINGS[name], clock), best.get(name)
-                        times = {k: min(new[k], old[k]) if old else new[k] for k in PARTS}
-                        best[name] = new | times
-            for name, b in best.items():
-                times = " ".join(f"{b[k]:8.1f}" for k in PARTS)
-                print(
-                    f"{cells:5} {ranks:5} {name:32} {times}"
-                    f"  iterations {b['iterations']}; continuity {float(b['continuity']):.1e}",
-                    flush=True,
-                )
-                rows.append({"cells": cells, "ranks": ranks, "setting": name} | b)
-    if args.csv:
-        with args.csv.open("w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS)
-            writer.writeheader()
-            for row in rows:
-                writer.writerow(row | {k: f"{row[k]:.2f}" for k in PARTS})
+    meshes = [(n, r) for n in cells for r in ranks]
+    for n, r in study_steps(meshes, len(meshes), "meshes"):
+        with tempfile.TemporaryDirectory(prefix="gbm-bench-") as folder:
+            path = Path(folder) / "case"
+            make_case(Path(case), path, n, r, steps)
+            clock = process_clock(Path(folder)) if processor_time else None
+            best: dict[str, dict] = {}
+            for _ in range(repeats):
+                for name in names:
+                    new, old = measure(path, r, SETTINGS[name], clock), best.get(name)
+                    best[name] = new | {k: min(new[k], old[k]) if old else new[k] for k in PARTS}
+        rows += [{"cells": n, "ranks": r, "setting": name} | b for name, b in best.items()]
+    return {"rows": rows}
 
 
-if __name__ == "__main__":
-    main()
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"]
+
+
+def table(result: dict) -> str:
+    """The result of `run` as text."""
+    lines = [f"{'cells':>5} {'ranks':>5} {'setting':32} {' '.join(f'{part:>8}' for part in PARTS)} [ms]"]
+    for b in result["rows"]:
+        times = " ".join(f"{b[k]:8.1f}" for k in PARTS)
+        lines.append(
+            f"{b['cells']:5} {b['ranks']:5} {b['setting']:32} {times}"
+            f"  iterations {b['iterations']}; continuity {float(b['continuity']):.1e}"
+        )
+    return "\n".join(lines)

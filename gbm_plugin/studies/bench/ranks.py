@@ -1,7 +1,5 @@
 """What the coupling costs on several ranks and with several daemons, beside a model of it.
 
-    python tools/benchmark_coupling.py CASE [--cells 64] [--json FILE]
-
 Constants, nanoseconds per bead of sampling, finding, sending and of a daemon's step, come from one rank with one
 daemon and two numbers of fibers; the model then predicts the other runs:
 
@@ -17,10 +15,11 @@ model does not know.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
-from gbm_plugin.studies.bench.coupling import run
+from ..study import option
+from . import coupling
+from .coupling import PARTS
 
 BEADS = 20
 FEW, MANY = 1000, 20_000  # fibers
@@ -28,7 +27,7 @@ FEW, MANY = 1000, 20_000  # fibers
 
 def measure(case: Path, cells: int, fibers: int, ranks: int, daemons: int, turns: int) -> dict:
     """The turn with the shortest step."""
-    runs = [run(case, cells, fibers, BEADS, 20, ranks=ranks, daemons=daemons) for _ in range(turns)]
+    runs = [coupling.run(case, cells, fibers, BEADS, 20, ranks=ranks, daemons=daemons) for _ in range(turns)]
     return min(runs, key=lambda r: r["step"])
 
 
@@ -51,48 +50,56 @@ def predict(c: dict, flow: float, beads: int, ranks: int, daemons: int) -> dict[
     return {"coupling": coupling, "daemon": daemon, "step": flow + coupling + max(0.0, daemon - flow)}
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("case", type=Path)
-    parser.add_argument("--cells", type=int, default=64)
-    parser.add_argument(
-        "--turns", type=int, default=2, help="of each run, the fastest of which counts (default: 2)"
-    )
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    arguments = parser.parse_args()
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, run, "case", "OpenFOAM case that is copied (default: this folder)")
+    option(parser, run, "cells", "in each direction")
+    option(parser, run, "turns", "of each run, of which the fastest counts")
+
+
+def run(case: Path | str, cells: int = 64, turns: int = 2) -> dict:
+    """Measured and predicted seconds of all runs, and the constants of the model. Raises as `coupling.run`."""
 
     def turn(fibers: int, ranks: int, daemons: int) -> dict:
-        return measure(arguments.case, arguments.cells, fibers, ranks, daemons, arguments.turns)
+        return measure(Path(case), cells, fibers, ranks, daemons, turns)
 
     few = {ranks: turn(FEW, ranks, 1) for ranks in (1, 2, 4)}
     many = {(r, d): turn(MANY, r, d) for r, d in ((1, 1), (1, 2), (2, 1), (2, 2), (4, 1), (4, 2), (4, 4))}
     c = constants(few[1], many[1, 1])
-    print("constants, ms and ns per bead:")
-    for name, (fixed, slope) in c.items():
-        print(f"    {name:<10}{1e3 * fixed:8.2f}{1e9 * slope:8.0f}")
-    rows = [*few.values(), *many.values()]
-    print("| ranks | daemons | fibers | coupling: ms, model | daemon: ms, model | step: ms, model |")
-    print("|---|---|---|---|---|---|")
-    for r in rows:
+    found = []
+    for r in [*few.values(), *many.values()]:
         base = few[r["ranks"]]
-        own = sum(base[name] for name in ("wait", "location", "sampling", "sending"))
-        p = predict(c, base["step"] - own, r["fibers"] * BEADS, r["ranks"], r["daemons"])
-        coupling = sum(r[name] for name in ("location", "sampling", "sending"))
-        r["predicted"] = p
-        cells = [(coupling, p["coupling"]), (r["daemon"], p["daemon"]), (r["step"], p["step"])]
-        text = " | ".join(f"{1e3 * a:.1f}, {1e3 * b:.1f}" for a, b in cells)
-        print(f"| {r['ranks']} | {r['daemons']} | {r['fibers']} | {text} |")
+        flow = base["step"] - sum(base[name] for name in PARTS)
+        predicted = predict(c, flow, r["fibers"] * r["beads"], r["ranks"], r["daemons"])
+        coupling_time = sum(r[name] for name in PARTS if name != "wait")
+        found.append(r | {"coupling": coupling_time} | {f"{k}_model": v for k, v in predicted.items()})
+    limits = {}
     for ranks, r in few.items():
-        flow = r["step"] - sum(r[name] for name in ("wait", "location", "sampling", "sending"))
-        limit = (flow - c["daemon"][0]) / c["daemon"][1] / BEADS
-        print(
-            f"{ranks} rank(s): a step of {1e3 * flow:.0f} ms; one daemon keeps up with {limit:.0f} fibers of {BEADS}"
+        flow = r["step"] - sum(r[name] for name in PARTS)
+        limits[ranks] = {"flow": flow, "fibers": (flow - c["daemon"][0]) / c["daemon"][1] / BEADS}
+    return {"constants": c, "rows": found, "limits": limits}
+
+
+def rows(result: dict) -> list[dict]:
+    """The lines of a CSV file."""
+    return result["rows"]
+
+
+def table(result: dict) -> str:
+    """The result of `run` as text."""
+    lines = ["constants, ms and ns per bead:"]
+    lines += [f"    {n:<10}{1e3 * a:8.2f}{1e9 * b:8.0f}" for n, (a, b) in result["constants"].items()]
+    lines += [
+        "| ranks | daemons | fibers | coupling: ms, model | daemon: ms, model | step: ms, model |",
+        "|---|---|---|---|---|---|",
+    ]
+    for r in result["rows"]:
+        text = " | ".join(
+            f"{1e3 * r[n]:.1f}, {1e3 * r[f'{n}_model']:.1f}" for n in ("coupling", "daemon", "step")
         )
-    if arguments.json:
-        arguments.json.write_text(json.dumps({"constants": c, "rows": rows}, indent=2) + "\n")
-
-
-if __name__ == "__main__":
-    main()
+        lines.append(f"| {r['ranks']} | {r['daemons']} | {r['fibers']} | {text} |")
+    for ranks, r in result["limits"].items():
+        lines.append(
+            f"{ranks} rank(s): a step of {1e3 * r['flow']:.0f} ms; "
+            f"one daemon keeps up with {r['fibers']:.0f} fibers of {BEADS}"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,106 @@
+"""What a study is: one module in one of the folders beside this one, with
+
+    add_arguments(parser)      its own arguments, beside their code (`option` takes a default from `run`)
+    run(**arguments) -> dict   the measurement; long ones show how far they are (`steps`) and can be resumed
+    rows(result) -> list       dictionaries of plain numbers and words: the lines of `--csv`
+    table(result) -> str       for a person
+    draw(result) -> Figure     for `--figure`; a study without one has no picture
+
+The first line of its docstring is its title. `gbm study` finds it by its file: convergence.py is `convergence`,
+flow_one.py is `flow-one`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+GROUPS = {
+    "validate": "The coupling and its engines judged: by each other, by analytic flows, by averages",
+    "bench": "Speed beside error; ratios within one run",
+    "paper": "The figures of the paper, and beyond them",
+}
+CONTRACT = {"add_arguments", "run", "rows", "table"}
+
+
+@dataclass(frozen=True)
+class Study:
+    """Where a study is, and what it says of itself; it is imported when it is used."""
+
+    group: str
+    path: Path
+
+    @property
+    def name(self) -> str:
+        return self.path.stem.replace("_", "-")
+
+    @property
+    def title(self) -> str:
+        """The first line of the module's docstring."""
+        text = ast.get_docstring(ast.parse(self.path.read_text()))
+        return (text or "").partition("\n")[0]
+
+    def load(self) -> ModuleType:
+        return import_module(f"{__package__}.{self.group}.{self.path.stem}")
+
+
+def find_studies() -> dict[str, Study]:
+    """All studies by name, in the order of the groups."""
+    found = {}
+    for group in GROUPS:
+        for path in sorted((Path(__file__).parent / group).glob("*.py")):
+            defined = {n.name for n in ast.parse(path.read_text()).body if isinstance(n, ast.FunctionDef)}
+            if defined >= CONTRACT:
+                found[path.stem.replace("_", "-")] = Study(group, path)
+    return found
+
+
+def listing(studies: Mapping[str, Study]) -> str:
+    """The names and titles of all studies, by group."""
+    width = max(map(len, studies), default=0)
+    lines = ["gbm study NAME [options]; gbm study NAME --help has them, with units and defaults"]
+    for group, title in GROUPS.items():
+        lines += ["", f"{group}: {title}"]
+        lines += [f"    {s.name:<{width}}  {s.title}" for s in studies.values() if s.group == group]
+    return "\n".join(lines)
+
+
+def option(parser: argparse.ArgumentParser, run: Callable, name: str, text: str, **words) -> argparse.Action:
+    """An argument `--name` of a study, or the positional `case`, whose default and type are those of `run`'s
+    parameter."""
+    default = inspect.signature(run).parameters[name].default
+    if default is inspect.Parameter.empty:  # a case to judge
+        return parser.add_argument(name, nargs="?", default=".", type=Path, help=text, **words)
+    flag = f"--{name.replace('_', '-')}"
+    if isinstance(default, bool):
+        return parser.add_argument(flag, action=argparse.BooleanOptionalAction, default=default, help=text)
+    listed = isinstance(default, (tuple, list))
+    shown = " ".join(map(str, default)) if listed else default
+    if listed and default:
+        words = {"nargs": "+", "type": type(default[0])} | words
+    elif not listed and default is not None and "choices" not in words:
+        words = {"type": type(default)} | words
+    text = f"{text} (default: {shown})" if default is not None and len(str(shown)) < 60 else text
+    return parser.add_argument(flag, default=default, help=text.replace("%", "%%"), **words)
+
+
+def steps(work: Iterable, total: int, title: str) -> Iterator:
+    """The items of `work`, of which there are `total`, with a bar on a terminal that says how long it will take;
+    elsewhere nothing."""
+    console = Console(file=sys.stderr)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(title, total=total)
+        for item in work:
+            yield item
+            bar.advance(task)
