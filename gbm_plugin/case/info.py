@@ -16,7 +16,7 @@ def figures(scene: Scene) -> dict:
     does not fix it (it is the input power of constantPower)."""
     dissipation = scene.forcing.values.get("power") if scene.forcing else None
     flow = {
-        "viscosity": scene.viscosity,
+        "viscosity": scene.kinematic_viscosity,
         "density": scene.density,
         "box": scene.box,
         "cells": scene.cells,
@@ -34,7 +34,7 @@ def figures(scene: Scene) -> dict:
 
 
 def _kolmogorov(scene: Scene, dissipation: float | None) -> float | None:
-    return (scene.viscosity**3 / dissipation) ** 0.25 if dissipation else None
+    return (scene.kinematic_viscosity**3 / dissipation) ** 0.25 if dissipation else None
 
 
 def _family(f: Family, scene: Scene, dissipation: float | None) -> dict:

@@ -88,11 +88,11 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Scene:
-    """What both engines read of a case. SI units; `viscosity` is kinematic, nu [m2/s]."""
+    """What both engines read of a case. SI units."""
 
     case: Path
     application: str
-    viscosity: float
+    kinematic_viscosity: float
     density: float
     time_step: float
     start_time: float
@@ -111,7 +111,7 @@ class Scene:
     @property
     def dynamic_viscosity(self) -> float:
         """mu = rho nu [Pa s]."""
-        return self.density * self.viscosity
+        return self.density * self.kinematic_viscosity
 
     def part(self, share: Share) -> Scene:
         """The scene of one daemon, with its part of every family."""
@@ -139,7 +139,7 @@ def read_scene(case: Path | str) -> Scene:
     scene = Scene(
         case=case,
         application=control.word("application", default="pimpleFoam"),
-        viscosity=_read_viscosity(case),
+        kinematic_viscosity=_read_viscosity(case),
         density=fibers.number("rho", 1.0, above=0),
         time_step=time_step,
         start_time=control.number("startTime", 0.0),

@@ -180,7 +180,7 @@ class Session:
                 f"{self.scene.case}/constant/fiberProperties was edited in between"
             )
         pairs = [
-            ("nu", hello.viscosity, self.scene.viscosity),
+            ("nu", hello.viscosity, self.scene.kinematic_viscosity),
             ("deltaT", hello.time_step, self.scene.time_step),
         ]
         if self.scene.box is not None:

@@ -32,7 +32,7 @@ class Journal:
             [_family_record(f) for f in scene.families],
             box_origin=origin,
             box_size=box,
-            viscosity=scene.dynamic_viscosity,
+            dynamic_viscosity=scene.dynamic_viscosity,
             density=scene.density,
             dictionaries=scene.texts,
             program_version=__version__,

@@ -64,7 +64,7 @@ class Recorder:
     Every append is one transaction: whenever the process dies, and when the disk fills, all earlier records
     stay readable. No handle on the file is kept between appends, so others may read it at any time.
 
-    box_origin, box_size: (3,) [m]; viscosity: dynamic [Pa s]; density [kg/m³]; dictionaries: text of the
+    box_origin, box_size: (3,) [m]; dynamic_viscosity [Pa s]; density [kg/m³]; dictionaries: text of the
     case's dictionaries by file name. Raises FileExistsError if the file exists, FileFullError (an OSError) if
     there is no room for it, ValueError for values that are not allowed.
     """
@@ -76,7 +76,7 @@ class Recorder:
         *,
         box_origin: ArrayLike,
         box_size: ArrayLike,
-        viscosity: float,
+        dynamic_viscosity: float,
         density: float,
         dictionaries: Mapping[str, str],
         program_version: str,
@@ -89,7 +89,7 @@ class Recorder:
         scene = {
             "box_origin": (np.asarray(box_origin, dtype=float), "m"),
             "box_size": (np.asarray(box_size, dtype=float), "m"),
-            "viscosity": (np.float64(viscosity), "Pa s"),
+            "viscosity": (np.float64(dynamic_viscosity), "Pa s"),
             "density": (np.float64(density), "kg/m^3"),
         }
         for name, (value, _) in scene.items():

@@ -20,7 +20,7 @@ from .transaction import Transaction
 
 ATTEMPTS, PAUSE = 4, 0.02  # to open a file that a run is adding to [s]
 
-__all__ = ["Family", "FamilyRecord", "Positions", "Recorder", "Recording", "open_recording"]
+__all__ = ["FamilyRecord", "Positions", "RecordedFamily", "Recorder", "Recording", "open_recording"]
 
 
 class Positions:
@@ -62,7 +62,7 @@ class Positions:
 
 
 @dataclass(frozen=True)
-class Family(FamilyRecord):
+class RecordedFamily(FamilyRecord):
     """A recorded family: its FamilyRecord and its positions (S, F, N, 3) [m]."""
 
     positions: Positions = None
@@ -72,7 +72,7 @@ class Recording:
     """One run's fibers, read from one file or from the parts that its restarts wrote.
 
     times (S,) [s]; steps (S,); families by name; box_origin, box_size (3,) [m]; metadata: schema_version,
-    program, program_version, viscosity [Pa s], density [kg/m³], dictionaries (text by file name).
+    program, program_version, dynamic_viscosity [Pa s], density [kg/m³], dictionaries (text by file name).
     Usable as a context manager; positions are read from the open files.
     """
 
@@ -87,7 +87,7 @@ class Recording:
         self.box_size = last.files[0].file["box_size"][()]
         self.metadata = last.files[0].metadata()
         self.families = {
-            name: Family(
+            name: RecordedFamily(
                 **vars(record),
                 positions=Positions(
                     [(part.positions(name), count) for part, count in zip(parts, counts, strict=True)]
@@ -208,8 +208,9 @@ class _File:
     def metadata(self) -> dict:
         values = dict(self.file.attrs)
         values["schema_version"] = int(values["schema_version"])
-        for name in ("viscosity", "density"):
-            values[name] = float(self.file[name][()])
+        # attributes of Recording, and the names in the file
+        for name, dataset in (("dynamic_viscosity", "viscosity"), ("density", "density")):
+            values[name] = float(self.file[dataset][()])
         texts = {}
 
         def collect(name: str, node) -> None:

@@ -144,7 +144,7 @@ def _scales(time: float, k: NDArray, spectrum: NDArray, table: dict | None, reco
         if epsilon > 0 and eta > 0 and abs(table["Time"][row] - time) <= 0.01 * np.ptp(table["Time"]):
             return epsilon, eta, "epsilonBudget and eta of linearForcing.dat"
     if recording is not None:
-        nu = recording.metadata["viscosity"] / recording.metadata["density"]
+        nu = recording.metadata["dynamic_viscosity"] / recording.metadata["density"]
         epsilon = float(2 * nu * (k[1] - k[0]) * (k**2 * spectrum).sum())
         if epsilon > 0:
             return epsilon, (nu**3 / epsilon) ** 0.25, "2 nu sum k^2 E"

@@ -46,7 +46,7 @@ def run_spectral(
     start = choose_start(folder, scene.start_time, scene.end_time, scene.time_step, fresh)
     solver = SpectralSolver(
         cells,
-        scene.viscosity,
+        scene.kinematic_viscosity,
         box=box,
         forcing=_forcing(scene.forcing),
         time_step=scene.time_step,
@@ -122,7 +122,7 @@ class _SpectralFlow(Carrier):
         self.before, self.now = self.now, (energy, power)
         if self.before is not None:
             balance = 0.5 * (power + self.before[1]) - (energy - self.before[0]) / self.scene.time_step
-        nu, u = self.scene.viscosity, math.sqrt(2 * energy / 3)
+        nu, u = self.scene.kinematic_viscosity, math.sqrt(2 * energy / 3)
         reynolds = u**2 * math.sqrt(15 / (nu * dissipation)) if dissipation > 0 else 0.0
         eta = (nu**3 / dissipation) ** 0.25 if dissipation > 0 else math.inf
         coefficient = power / (2 * energy) if energy > 0 else 0.0

@@ -1,4 +1,4 @@
-"""The figures of `gbm validate`."""
+"""The figures of the studies that validate."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def test_words_of_all_families_and_of_one(case):
     a, b = (f.model for f in scene.families)
     assert a == Model("implicit", "freeDrain", "consistent", "discreteRod", False, 1e-3)
     assert b == Model("auto", "freeDrain", "consistent", "sine", False, 1e-5)
-    assert scene.dynamic_viscosity == pytest.approx(2 * scene.viscosity)
+    assert scene.dynamic_viscosity == pytest.approx(2 * scene.kinematic_viscosity)
 
 
 def test_stiffness_from_youngs_modulus_and_length_from_radius(case):
@@ -131,9 +131,9 @@ def test_two_forcings_are_one_too_many(case):
 def test_viscosity_with_dimensions(case):
     path = case / "constant/transportProperties"
     path.write_text(HEADER + "transportModel Newtonian;\nnu [0 2 -1 0 0 0 0] 2.5e-3;\n")
-    assert read_scene(case).viscosity == 2.5e-3
+    assert read_scene(case).kinematic_viscosity == 2.5e-3
     path.write_text(HEADER + "transportModel Newtonian;\nnu nu [0 2 -1 0 0 0 0] 2.5e-4;\n")
-    assert read_scene(case).viscosity == 2.5e-4
+    assert read_scene(case).kinematic_viscosity == 2.5e-4
 
 
 def test_positions_from_a_file(case):

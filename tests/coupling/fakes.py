@@ -127,7 +127,7 @@ class FakeSolver:
             until(lambda: self.socket.connect_ex(str(path)) == 0, "a connection to the daemon")
         self.socket.settimeout(PATIENCE)
         values = {
-            "viscosity": self.scene.viscosity,
+            "viscosity": self.scene.kinematic_viscosity,
             "time_step": self.scene.time_step,
             "box_min": (0.0, 0.0, 0.0),
             "box_max": (BOX, BOX, BOX),

@@ -142,7 +142,7 @@ def make_case(case: Path, cells: int = 16, counts: tuple[int, int] = (12, 12)) -
         for family, bend, seed in zip(families, (0.7, 2.2), (1, 2), strict=True)
     ]
     scene = dict(
-        box_origin=[0] * 3, box_size=[BOX] * 3, viscosity=NU, density=1.0,
+        box_origin=[0] * 3, box_size=[BOX] * 3, dynamic_viscosity=NU, density=1.0,
         dictionaries={"constant/fiberProperties": "rho 1;"}, program_version="0.1.0",
     )  # fmt: skip
     for start, part in (("0", steps[:29]), ("1.2", steps[24:])):

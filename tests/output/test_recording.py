@@ -38,7 +38,7 @@ def test_everything_written_is_read_back(write):
             np.testing.assert_array_equal(family.bending_stiffness, written.bending_stiffness)
         np.testing.assert_array_equal(recording.box_size, [BOX] * 3)
         assert recording.metadata["dictionaries"] == SCENE["dictionaries"]
-        assert recording.metadata["viscosity"] == 1e-3
+        assert recording.metadata["dynamic_viscosity"] == 1e-3
         assert recording.metadata["schema_version"] == 1
 
 
@@ -128,7 +128,7 @@ def test_bad_record_is_refused_and_changes_nothing(tmp_path, step, change, error
     [
         dict(box_size=(1, 1)),
         dict(box_size=(1, 1, 0)),
-        dict(viscosity=0),
+        dict(dynamic_viscosity=0),
         dict(density=np.nan),
         dict(families=[]),
     ],

@@ -9,7 +9,7 @@ import pytest
 
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.times import Start
-from gbm_plugin.errors import CaseError
+from gbm_plugin.errors import PredictionError
 from gbm_plugin.run.driver import Carrier, Run, results_folder
 
 from conftest import make_case
@@ -49,7 +49,9 @@ def test_fibers_go_with_a_uniform_wind(tmp_path):
 
 
 def test_a_flow_that_jumps_is_refused_at_its_step(tmp_path):
-    with pytest.raises(CaseError, match=r"^step 7: the flow at a fiber was predicted with an error of 4 m/s"):
+    with pytest.raises(
+        PredictionError, match=r"^step 7: the flow at a fiber was predicted with an error of 4 m/s"
+    ):
         run(tmp_path, Wind(7, -3.0)).to_the_end()
 
 

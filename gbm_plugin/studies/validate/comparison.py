@@ -86,7 +86,7 @@ def make(
 
 def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str) -> State:
     """Run a copy from `make` in "openfoam" or "spectral". interpolation: of the flow at the beads. Raises as
-    `gbm_plugin.run.run`."""
+    `gbm_plugin.run.openfoam.run`."""
     spectral = engine == "spectral"
     words = FIBERS.format(steps=steps, interpolation=interpolation)
     (copy / "constant/fiberProperties").write_text(HEADER + words)

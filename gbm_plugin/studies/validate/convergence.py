@@ -35,7 +35,7 @@ def run(
     case: whose schemes, solver settings and interpolation at the beads are judged. time_step: that of the coarsest
     mesh [s]; finer ones take it in proportion to their cells. Velocity: rms difference at the cell centres over the
     rms velocity. Fibers: rms difference of the end beads over the fiber length, for each family. Raises as
-    `gbm_plugin.run.run`.
+    `gbm_plugin.run.openfoam.run`.
     """
     checked_cells(cells)
     checked_step(time_step, END_TIME / 4)

@@ -65,7 +65,7 @@ def run(
     case: whose flow is taken: forcing, viscosity, initial field, schemes. cells: one number, in each direction.
     time_step [s], steps: of the run that is stored, a power of two. development: least time before it, without
     fibers [s]. Distance: rms over the end beads, over the fiber length, for each family. Raises as
-    `gbm_plugin.run.run`.
+    `gbm_plugin.run.openfoam.run`.
     """
     if len(cells) != 1 or cells[0] < 8 or cells[0] % 2:
         raise ValueError(f"cells are {' '.join(map(str, cells))}; one even number of at least 8 is needed")
@@ -125,7 +125,7 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
 
 def _kolmogorov_time(live: Path) -> float:
     table = read_dat(results(live, FLOW), FLOW_TABLE)
-    return float(np.sqrt(read_scene(live).viscosity / np.mean(table["epsilonBudget"])))
+    return float(np.sqrt(read_scene(live).kinematic_viscosity / np.mean(table["epsilonBudget"])))
 
 
 def _distances(live: Path, in_time: str, every: int) -> dict[str, float]:

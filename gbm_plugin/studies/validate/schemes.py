@@ -121,7 +121,7 @@ def run(
     """Errors and processor time of the `settings` (names of SETTINGS) on each mesh.
 
     case: whose other schemes and solver settings are used. time_step: the longest, of the first of `cells` [s];
-    others take it in proportion. Raises as `gbm_plugin.run.run`.
+    others take it in proportion. Raises as `gbm_plugin.run.openfoam.run`.
     """
     checked_cells(cells)
     checked_step(time_step, END_TIME / 4)

@@ -71,7 +71,7 @@ def run(
 
     time_step: that of the first mesh [s]; others take it in proportion to their cells, the spectral solver two
     thirds of that, as its Adams-Bashforth scheme needs. Two runs at a time where there are cores for it. Raises
-    as `gbm_plugin.run.run`, and ValueError where the runs are too short for a standard error.
+    as `gbm_plugin.run.openfoam.run`, and ValueError where the runs are too short for a standard error.
     """
     checked_cells([*cells, reference_cells] if reference_cells not in cells else cells)
     checked_step(time_step, TURNOVER / RECORDS)

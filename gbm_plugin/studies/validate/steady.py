@@ -70,7 +70,7 @@ def run(
     for each family, the rms difference of the end beads from `simulate` in the ABC flow over the length.
     Rows of steps: the same differences between the run and that of half the step; "extrapolation", the error
     of the fibers where the coupling's sequence of samples is taken from the ABC flow itself.
-    Raises as `gbm_plugin.run.run`.
+    Raises as `gbm_plugin.run.openfoam.run`.
     """
     checked_cells(cells)
     checked_step(time_step, END_TIME / 4 / 2**halvings)
