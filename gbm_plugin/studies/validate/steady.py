@@ -139,7 +139,7 @@ def _solve(case: Path | str, folder: Path, cells: int, steps: int) -> _Run:
     run_openfoam(copy)
     velocity = read_velocity(copy, f"{END_TIME:g}", (cells, cells, cells))
     with open_recording(results(copy)) as recording:
-        viscosity = recording.metadata["viscosity"]
+        viscosity = recording.metadata["dynamic_viscosity"]
         families = recording.families.items()
         start = {name: Fibers(f.positions[0], f.bending_stiffness, viscosity) for name, f in families}
         end = {name: f.positions[-1] for name, f in families}
