@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import CaseError
+from ..files import replaced
 from .dictionary import Dictionary
 from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
 
@@ -79,7 +80,7 @@ def write_velocity(template: Path, target: Path, velocity: np.ndarray) -> None:
     cells = velocity.transpose(3, 2, 1, 0).reshape(-1, 3)
     head = _binary_header(head)
     target.parent.mkdir(parents=True, exist_ok=True)
-    with target.open("wb") as file:
+    with replaced(target, "wb") as file:
         file.write(f"{head}internalField   nonuniform List<vector> \n{len(cells)}\n(".encode())
         file.write(np.ascontiguousarray(cells, dtype="<f8").tobytes())
         file.write(f")\n;{tail.rstrip()}\n\n{END}\n".encode())

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import CaseError, LockedError
+from ..files import opened_lock
 
 RUN, DAEMON = "run", "daemon"
 
@@ -18,14 +19,13 @@ def locked(case: Path, who: str) -> Iterator[int]:
     """The only run or daemon of a case. Yields the lock's descriptor: a child process that gets it keeps the
     case locked although this process dies. LockedError where another process has the lock."""
     try:
-        file = (case / f".gbm.{who}.lock").open("a+")
+        file = opened_lock(case / f".gbm.{who}.lock")
     except OSError as error:
-        raise CaseError(f"cannot write in {case}: {error.strerror}") from None
+        raise CaseError(f"cannot write {case / f'.gbm.{who}.lock'}: {error.strerror}") from None
     with file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            file.seek(0)
             raise LockedError(
                 f"another {who} is under way in {case} (process {file.read().strip()}, or one that it started)"
             ) from None

@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 from ..errors import InstallationError, UtilityError
+from ..files import created
 from .layout import log_file
 
 DEBIAN = Path("/usr/share/openfoam")
@@ -56,7 +57,7 @@ def command(program: str, case: Path, ranks: int = 1) -> list[str]:
 def utility(case: Path, program: str, *options: str) -> None:
     """Run a utility to its end, its output in `log.<program>`. UtilityError with its own words where it fails."""
     log = log_file(case, program)
-    with log.open("w") as output:
+    with created(log) as output:
         done = subprocess.run(
             [*command(program, case), *options],
             env=environment(),

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 from ..errors import CaseError
+from ..files import created
 from .dictionary import Dictionary
 from .initial import is_made_here, read_initial_field, write_velocity
 from .layout import fiber_state, processors, time_folders, velocity_file
@@ -23,7 +24,8 @@ def prepare(scene: Scene, start: Start, ranks: int) -> None:
         initial_fields(scene)
     if not _mesh_time(case):
         raise CaseError(f"{case} has no mesh (constant/polyMesh) and no system/blockMeshDict to make one")
-    (case / f"{case.name}.foam").touch()  # ParaView opens the case by this name
+    if not (case / f"{case.name}.foam").is_file():  # ParaView opens the case by this name
+        created(case / f"{case.name}.foam").close()
     _decompose(case, start, ranks)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import os
+import re
 import secrets
 import time
 from collections.abc import Callable
@@ -12,9 +12,13 @@ from pathlib import Path
 from ..case.scene import Coupling
 from ..case.share import Share
 from ..errors import CouplingError
+from ..files import private_folder, replaced
 from .channel import Channel, Listener
 from .message import HEADER_SIZE, MAX_TEXT, Message
 from .sockets import POLL, write_secret
+
+# messages of an earlier session, whole or not; not `session`, which is replaced: a solver may be waiting with it
+OWN = re.compile(r"(\.[0-9a-f]{16}\.)?[0-9a-f]{16}\.(flow|fibers)\.\d+(\.part)?")
 
 
 class FileChannel(Channel):
@@ -33,11 +37,9 @@ class FileChannel(Channel):
 
     def _write(self, *parts: bytes | memoryview) -> None:
         target = self._folder / f"{self._session}.fibers.{self._sent}"
-        part = target.with_name(target.name + ".part")
         try:
-            with part.open("wb") as file:
+            with replaced(target, "wb", private=True) as file:
                 file.writelines(parts)
-            os.replace(part, target)
         except OSError as error:
             raise self.error(f"cannot write {target}: {error.strerror}") from None
         self._sent += 1
@@ -88,12 +90,11 @@ class FileListener(Listener):
         self.folder = case / share.name("exchange")
         self.session = secrets.token_hex(8)
         try:
-            self.folder.mkdir(mode=0o700, exist_ok=True)
-            for stale in self.folder.iterdir():
-                if stale.name != "session":  # which is replaced: a solver may be waiting with the old one
+            for stale in private_folder(self.folder).iterdir():
+                if OWN.fullmatch(stale.name):
                     stale.unlink()
         except OSError as error:
-            raise CouplingError(f"cannot use the folder {self.folder}: {error.strerror}") from None
+            raise CouplingError(f"cannot use {error.filename or self.folder}: {error.strerror}") from None
         write_secret(self.folder / "session", self.session + "\n")
 
     def accept(self, give_up: Callable[[], bool]) -> Channel | None:

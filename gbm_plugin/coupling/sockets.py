@@ -14,6 +14,7 @@ from pathlib import Path
 from ..case.scene import Coupling
 from ..case.share import Share
 from ..errors import CouplingError
+from ..files import write_text
 from .channel import Channel, Listener
 from .message import MAX_TEXT, Kind, Message
 
@@ -188,10 +189,7 @@ class TcpListener(SocketListener):
 
 def write_secret(path: Path, text: str) -> None:
     """A whole file that only the owner reads, in one step."""
-    part = path.with_suffix(".part")
     try:
-        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w") as file:
-            file.write(text)
-        os.replace(part, path)
+        write_text(path, text, private=True)
     except OSError as error:
         raise CouplingError(f"cannot write {path}: {error.strerror}") from None

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import logging
-import os
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +16,7 @@ from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
 from ..errors import CaseError, PredictionError, StateError
 from ..fiber import Fibers, Stepper, merged_states
+from ..files import replaced
 from ..flow import NEEDS
 from ..statistics.fibers import end_to_end_squared_ratio
 
@@ -172,17 +171,8 @@ class Fleet:
         path = folder / STATE_FILE
         path = path.with_name(self.share.name(path.stem, path.suffix))
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_suffix(".part")
-        try:
-            with part.open("wb") as file:
-                file.write(buffer.getbuffer())
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, path)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                part.unlink()
-            raise OSError(error.errno, error.strerror, str(path)) from None
+        with replaced(path, "wb", durable=True) as file:
+            file.write(buffer.getbuffer())
 
     def restore(self, folder: Path) -> None:
         """Continue from the state in a time folder, whatever daemons shared it. StateError where it is of other

@@ -11,6 +11,7 @@ from .. import __version__
 from ..case.layout import daemon_table, recording_name
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share
+from ..files import created
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
 from .fleet import Fleet
@@ -38,7 +39,7 @@ class Journal:
             program_version=__version__,
         )
         self._path = keep_earlier(folder / daemon_table(share))
-        self._table = self._path.open("w", buffering=1)
+        self._table = created(self._path, buffering=1)
         names = ["Time", "step", "sentAt", "arrivedAt", "gap", *(f"R2_{f.name}" for f in scene.families)]
         self._table.write("# " + "\t".join(names) + "\n")
 

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..files import created
 from .transaction import FileFullError, Transaction
 
 SCHEMA_VERSION = 1
@@ -109,7 +110,7 @@ class Recorder:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         draft = self.path.with_name(f".{self.path.name}.{os.getpid()}")  # the file appears complete
         try:
-            draft.touch()
+            created(draft, "wb").close()
             with Transaction(draft, writable=True) as changes:
                 with h5py.File(changes, "w", libver=_FORMAT) as file:
                     self._write_header(file, scene, dictionaries, program_version)

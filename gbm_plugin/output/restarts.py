@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,9 +19,9 @@ _SAME_TIME = 1e-3
 def keep_earlier(path: Path) -> Path:
     """Give a file that is already there a number (``name.1``, ...), so that its name is free; returns path."""
     number = 1
-    while (kept := path.with_name(f"{path.name}.{number}")).exists():
+    while os.path.lexists(kept := path.with_name(f"{path.name}.{number}")):
         number += 1
-    if path.exists():
+    if os.path.lexists(path):
         path.rename(kept)
     return path
 

@@ -37,7 +37,7 @@ class Transaction(io.RawIOBase):
 
     def __init__(self, path: Path | str, *, writable: bool) -> None:
         super().__init__()
-        self._fd = os.open(path, os.O_RDWR if writable else os.O_RDONLY)
+        self._fd = os.open(path, (os.O_RDWR | os.O_NOFOLLOW) if writable else os.O_RDONLY)
         self._base = os.fstat(self._fd).st_size  # bytes below are pages of the file, above is new
         self._pages: dict[int, bytearray] = {}
         self._new = bytearray()

@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..files import replaced, replacement
 from ..output.recording import Recording
 from ..statistics.fibers import curvature
 
@@ -33,13 +34,15 @@ def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Pat
     collection = ElementTree.SubElement(root, "Collection")
     for row, time in enumerate(recording.times):
         file = pieces / f"fibers_{row:06d}.vtu"
-        polyline_mesh(recording, row, wrapped).write(file)
+        with replacement(file) as part:
+            polyline_mesh(recording, row, wrapped).write(part)
         ElementTree.SubElement(
             collection, "DataSet", timestep=f"{time:.12g}", part="0", file=f"{name}/{file.name}"
         )
     ElementTree.indent(root)
     path = Path(folder) / f"fibers_{name}.pvd"
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    with replaced(path, "wb") as file:
+        ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
     return path
 
 

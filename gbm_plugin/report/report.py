@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.layout import FLOW, FLOW_TABLE, results
+from ..files import replaced, write_text
 from ..output.field import box_mesh, latest_time, read_velocity, vorticity_magnitude
 from ..output.recording import Recording, open_recording
 from ..output.tables import read_dat
@@ -65,7 +66,7 @@ def report(case_dir: Path | str) -> dict:
         raise FileNotFoundError(f"{case} holds nothing to report: " + "; ".join(key["not_drawn"]))
     key["files"] = sorted(path.name for path in key["files"])
     key = _json_ready(key)
-    (folder / "report.json").write_text(json.dumps(key, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(folder / "report.json", json.dumps(key, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     return key
 
 
@@ -234,7 +235,8 @@ def _write_csv(path: Path, columns: dict[str, NDArray]) -> Path:
     header = ",".join(f'"{name}"' if "," in name else name for name in flat)
     rows = np.stack(list(flat.values()), axis=-1)
     path.parent.mkdir(exist_ok=True)
-    np.savetxt(path, rows, "%.12g", ",", header=header, comments="", encoding="utf-8")
+    with replaced(path, encoding="utf-8") as file:
+        np.savetxt(file, rows, "%.12g", ",", header=header, comments="")
     return path
 
 

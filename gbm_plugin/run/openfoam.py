@@ -22,6 +22,7 @@ from ..case.scene import Scene, read_scene
 from ..case.share import Share, all_shares
 from ..case.times import choose_start
 from ..errors import CaseError, RunError
+from ..files import created
 from ..output.restarts import keep_earlier
 from .progress import Progress
 from .standstill import Pulse, kill_session, where_it_stands
@@ -153,7 +154,7 @@ class _Processes:
 
     def _start(self, argv: list[str], log_file: Path, **variables: str) -> subprocess.Popen:
         keep_earlier(log_file)
-        with log_file.open("w") as output:
+        with created(log_file) as output:
             return subprocess.Popen(
                 argv,
                 env=environment() | variables,

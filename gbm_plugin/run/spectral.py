@@ -17,6 +17,7 @@ from ..case.layout import FLOW, FLOW_TABLE, results
 from ..case.scene import Forcing, Scene
 from ..case.times import choose_start
 from ..errors import CaseError
+from ..files import created, replaced
 from ..output.restarts import keep_earlier
 from ..spectral import EswaranPope, LinearForcing, SpectralSolver
 from ..spectral.interpolation import WORDS
@@ -110,7 +111,7 @@ class _SpectralFlow(Carrier):
     def open(self, name: str) -> None:
         path = results(self.scene.case, FLOW) / name / FLOW_TABLE
         path.parent.mkdir(parents=True, exist_ok=True)
-        self.table = keep_earlier(path).open("w", buffering=1)
+        self.table = created(keep_earlier(path), buffering=1)
         self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")
 
     def advance(self) -> None:
@@ -133,7 +134,7 @@ class _SpectralFlow(Carrier):
     def save(self, folder: Path) -> None:
         path = folder / FLOW_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("wb") as file:
+        with replaced(path, "wb") as file:
             np.savez(file, before=self.before, **self.solver.state())
 
     def restore(self, folder: Path) -> None:

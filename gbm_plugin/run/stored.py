@@ -16,6 +16,7 @@ import numpy as np
 from ..case.scene import Scene
 from ..case.times import choose_start
 from ..errors import CaseError
+from ..files import write_text
 from ..flow import StoredFlow, hdf5_flow
 from ..flow.grid import WORDS
 from ..flow.stored import SAME_TIME, refuse_gaps
@@ -131,7 +132,7 @@ class _Stored(Carrier):
     def save(self, folder: Path) -> None:
         path = folder / SOURCE_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(self.source, indent=2) + "\n")
+        write_text(path, json.dumps(self.source, indent=2) + "\n")
 
     def restore(self, folder: Path) -> None:
         path = folder / SOURCE_FILE
