@@ -10,7 +10,8 @@ void Foam::writeFiberCloud
 )
 {
     const word name("fibers");
-    passiveParticleCloud cloud(mesh, name, IDLList<passiveParticle>());
+    // passiveParticleCloud itself has no such constructor in later versions
+    Cloud<passiveParticle> cloud(mesh, name, IDLList<passiveParticle>());
 
     const auto labels = [&](const word& field)
     {

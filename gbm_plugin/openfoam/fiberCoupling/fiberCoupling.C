@@ -229,7 +229,7 @@ void Foam::functionObjects::fiberCoupling::learnFamilies()
     }
 
     // the same in all shares of the fibers
-    label wanted = daemons_.size() ? label(daemons_[0].wanted()) : NOTHING;
+    label wanted = daemons_.size() ? daemons_[0].wanted() : NOTHING;
     reduce(wanted, maxOp<label>());
     wanted_ = ambient(wanted);
     for (const fiberDaemon& daemon : daemons_)
