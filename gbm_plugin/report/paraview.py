@@ -1,4 +1,4 @@
-"""Fibers as a time series for ParaView: one .vtu per time with its own points, and a .pvd that lists them.
+"""Fibers as a time series for ParaView: one .vtp of polylines per time, and a .pvd that lists them.
 
 XDMF is not used: meshio's reader, and so a check, knows neither a slice of an HDF5 dataset nor moving points.
 """
@@ -12,30 +12,33 @@ import meshio
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..files import replaced, replacement
+from ..files import replaced
 from ..output.recording import Recording
 from ..statistics.fibers import curvature
+from .vtp import Polylines, write_vtp
 
 
 def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Path:
-    """Write all times of a recording as moving polylines of 2-node lines; returns the .pvd to open.
+    """Write all times of a recording as moving polylines; returns the .pvd to open. ParaView's filter Tube, with
+    "Vary Radius: By Absolute Scalar" and the array radius, shows them as they are.
 
     wrapped: every fiber cut at the faces of the periodic box and each piece shifted into it; otherwise fibers
-    are whole, where they were carried. Point data: family (its number), fiber, bead (indices in the family;
-    bead is fractional at a cut) and curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two
-    beads). Replaces a series that is there. Raises OSError if it cannot be written.
+    are whole, where they were carried. Point data: curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two
+    beads), velocity [m/s] (differences between records), radius [m], stiffness K^b [N m2], family (its number), fiber
+    (unique over the families), bead (index; fractional at a cut). Data of each line: family, fiber.
+    Replaces a series that is there. Raises OSError if it cannot be written.
     """
     name = "wrapped" if wrapped else "unwrapped"
     pieces = Path(folder) / name
     pieces.mkdir(parents=True, exist_ok=True)
-    for old in pieces.glob("fibers_*.vtu"):
+    for old in pieces.glob("fibers_*.vt[pu]"):
         old.unlink()
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
     collection = ElementTree.SubElement(root, "Collection")
     for row, time in enumerate(recording.times):
-        file = pieces / f"fibers_{row:06d}.vtu"
-        with replacement(file) as part:
-            polyline_mesh(recording, row, wrapped).write(part)
+        file = pieces / f"fibers_{row:06d}.vtp"
+        with replaced(file, "wb") as content:
+            write_vtp(content, polylines(recording, row, wrapped))
         ElementTree.SubElement(
             collection, "DataSet", timestep=f"{time:.12g}", part="0", file=f"{name}/{file.name}"
         )
@@ -46,34 +49,64 @@ def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Pat
     return path
 
 
-def polyline_mesh(recording: Recording, row: int, wrapped: bool) -> meshio.Mesh:
-    """All fibers at the `row`-th time as one mesh of lines, with the point data of write_series."""
-    points, lines, data, count = [], [], [], 0
+def polylines(recording: Recording, row: int, wrapped: bool) -> Polylines:
+    """All fibers at the `row`-th time, with the data of `write_series`."""
+    parts, first = [], 0
     for number, family in enumerate(recording.families.values()):
         positions = family.positions[row]
         fiber, bead = np.indices(positions.shape[:2], dtype=float)
-        values = np.stack(
-            [np.full_like(bead, number), fiber, bead, bead_curvature(positions, family.radius)], axis=-1
-        )
-        chains = np.concatenate([positions, values], axis=-1)
-        nodes, links = (
-            cut_at_faces(chains, recording.box_origin, recording.box_size) if wrapped else _whole(chains)
-        )
-        points.append(nodes[:, :3])
-        data.append(nodes[:, 3:])
-        lines.append(links + count)
-        count += len(nodes)
-    family, fiber, bead, kappa = np.concatenate(data).T.copy()
-    return meshio.Mesh(
-        np.concatenate(points),
-        [("line", np.concatenate(lines))],
-        point_data={
-            "family": family.astype(np.int32),
-            "fiber": fiber.astype(np.int32),
-            "bead": bead,
-            "curvature": kappa,
-        },
+        stiffness = np.broadcast_to(family.bending_stiffness, family.count)[:, None]
+        along = [
+            bead_curvature(positions, family.radius)[..., None],
+            _velocity(recording.times, family.positions, row),
+            *(np.broadcast_to(v, bead.shape)[..., None] for v in (family.radius, stiffness, number)),
+            (fiber + first)[..., None],
+            bead[..., None],
+        ]
+        chains = np.concatenate([positions, *along], axis=-1)
+        if wrapped:
+            nodes, links = cut_at_faces(chains, recording.box_origin, recording.box_size)
+            nodes, offsets = _joined(nodes, links)
+        else:
+            nodes = chains.reshape(-1, chains.shape[-1])
+            offsets = np.arange(0, len(nodes) + 1, family.beads)
+        parts.append((nodes, offsets))
+        first += family.count
+    starts = np.cumsum([0, *(len(nodes) for nodes, _ in parts)])
+    offsets = [start + part[:-1] for start, (_, part) in zip(starts, parts, strict=False)]
+    nodes = np.concatenate([nodes for nodes, _ in parts])
+    ends = np.concatenate([*offsets, starts[-1:]])
+    kappa, u, radius, stiffness, family, fiber, bead = np.split(nodes[:, 3:], [1, 4, 5, 6, 7, 8], axis=1)
+    whole = {"family": family[:, 0].astype(np.int32), "fiber": fiber[:, 0].astype(np.int32)}
+    along = {"curvature": kappa[:, 0], "velocity": u, "radius": radius[:, 0], "stiffness": stiffness[:, 0]}
+    return Polylines(
+        nodes[:, :3],
+        ends,
+        along | whole | {"bead": bead[:, 0]},
+        {name: values[ends[:-1]] for name, values in whole.items()},
     )
+
+
+def line_mesh(recording: Recording, row: int, wrapped: bool) -> meshio.Mesh:
+    """The same as lines of two nodes, for all formats that meshio writes."""
+    lines = polylines(recording, row, wrapped)
+    return meshio.Mesh(lines.points, [("line", lines.segments())], point_data=dict(lines.point_data))
+
+
+def _velocity(times: NDArray, positions, row: int) -> NDArray:
+    """Of the beads at one time, from the records beside it; 0 where there is one record only."""
+    before, after = max(row - 1, 0), min(row + 1, len(times) - 1)
+    if before == after:
+        return np.zeros_like(positions[row])
+    return (positions[after] - positions[before]) / (times[after] - times[before])
+
+
+def _joined(nodes: NDArray, links: NDArray) -> tuple[NDArray, NDArray]:
+    """Lines of the links that follow each other: points in their order, and offsets."""
+    start = np.flatnonzero(np.append(True, links[1:, 0] != links[:-1, 1])) if len(links) else np.empty(0, int)
+    lengths = np.diff(np.append(start, len(links))) + 1
+    order = np.insert(links[:, 1], start, links[start, 0])
+    return nodes[order], np.concatenate([[0], np.cumsum(lengths)])
 
 
 def bead_curvature(positions: ArrayLike, radius: float) -> NDArray[np.float64]:
@@ -82,12 +115,6 @@ def bead_curvature(positions: ArrayLike, radius: float) -> NDArray[np.float64]:
     if inner.shape[-1] == 0:
         return np.zeros(np.shape(positions)[:-1])
     return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
-
-
-def _whole(chains: NDArray) -> tuple[NDArray, NDArray]:
-    count, beads, width = chains.shape
-    first = (np.arange(count)[:, None] * beads + np.arange(beads - 1)).ravel()
-    return chains.reshape(-1, width), np.stack([first, first + 1], axis=-1)
 
 
 def cut_at_faces(chains: NDArray, origin: ArrayLike, size: ArrayLike) -> tuple[NDArray, NDArray]:
