@@ -140,8 +140,15 @@ def _daemon(arguments) -> None:
 
 def _report(arguments) -> dict:
     from .report.report import report
+    from .report.summary import summary
 
-    return report(Path(arguments.case))
+    result = report(Path(arguments.case))
+    print("\n".join(summary(arguments.case)))
+    folder = Path(arguments.case) / "report"
+    print(f"written to {folder}: {' '.join(result['files'])}")
+    for reason in result["not_drawn"]:
+        print(f"not drawn: {reason}")
+    return result
 
 
 def _info(arguments) -> dict:

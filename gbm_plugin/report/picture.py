@@ -147,26 +147,32 @@ def _strokes(
 
 
 def _draw_strokes(axes: Axes, strokes: list, points_per_metre: float, size: NDArray) -> None:
-    """From back to front: a dark rim, the body, a highlight; what is far fades."""
+    """From back to front: a dark rim, the body, a highlight; what is far fades.
+
+    A rim lies two diameters behind its body and a highlight a radius before it, so that where a fiber folds the
+    neighbours' bodies cover each other's rims, and other fibers are covered as wholes.
+    """
     ends, near, width, taper, colour = (np.concatenate(part) for part in zip(*strokes, strict=True))
+    radius = 0.5 * width
+    depth = np.clip(0.5 - near / np.linalg.norm(size), 0, 1)[:, None]
+    width = np.maximum(width * points_per_metre, _THINNEST) * taper
+    body = colour + 0.45 * depth * (0.97 - colour)
+    inner = np.maximum(width - 0.9, 0.7 * width)
+    shift = (width / points_per_metre)[:, None, None] * np.array([-0.13, 0.2])
+    layers = (
+        (near - 4 * radius, ends, width, 0.45 * body),
+        (near, ends, inner, body),
+        (near + radius, ends + shift, 0.3 * width, body + 0.55 * (1 - body)),
+    )
+    near, ends, width, colour = (np.concatenate(part) for part in zip(*layers, strict=True))
     # equally near pieces keep their order along the fiber
     order = np.argsort(np.round(near / np.linalg.norm(size), 6), kind="stable")
-    ends, near, colour = ends[order], near[order], colour[order]
-    width = (np.maximum(width * points_per_metre, _THINNEST) * taper)[order]
-    depth = np.clip(0.5 - near / np.linalg.norm(size), 0, 1)[:, None]
-    body = colour + 0.45 * depth * (0.97 - colour)
-    rim, light = 0.45 * body, body + 0.55 * (1 - body)
-    along = ends[:, 1] - ends[:, 0]
-    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
-    reach = 0.15 * (width / points_per_metre)[:, None] * along / length  # no gaps where pieces meet
-    longer = np.stack([ends[:, 0] - reach, ends[:, 1] + reach], axis=1)
-    shift = (width / points_per_metre)[:, None, None] * np.array([-0.13, 0.2])
     axes.add_collection(
         LineCollection(
-            np.stack([ends, longer, longer + shift], axis=1).reshape(-1, 2, 2),
-            linewidths=np.stack([width, np.maximum(width - 0.9, 0.7 * width), 0.3 * width], axis=1).ravel(),
-            colors=np.stack([rim, body, light], axis=1).reshape(-1, 3),
-            capstyle="butt",
+            ends[order],
+            linewidths=width[order],
+            colors=colour[order],
+            capstyle="round",  # no gaps where pieces meet
             rasterized=True,
             zorder=3,
         ),

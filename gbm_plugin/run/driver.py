@@ -22,6 +22,7 @@ from ..errors import CaseError, RunError
 from ..fleet.fleet import Fleet
 from ..fleet.journal import Journal
 from .progress import Progress
+from .words import closing, opening
 
 log = logging.getLogger(__name__)
 
@@ -99,6 +100,7 @@ class Run:
         scene = self.scene
         every = scene.write_interval / scene.time_step
         every = round(every) if math.isfinite(every) else 0
+        opening(scene, self.start.time)
         self.step = round(self.start.time / scene.time_step)
         last = self.step + round((scene.end_time - self.start.time) / scene.time_step)
         try:
@@ -118,6 +120,7 @@ class Run:
             self.carrier.close()
             for number, handler in handlers.items():
                 signal.signal(number, handler)
+        closing(scene, scene.case)
         return True
 
     def _observe(self) -> None:

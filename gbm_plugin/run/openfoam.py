@@ -26,6 +26,7 @@ from ..files import created
 from ..output.restarts import keep_earlier
 from .progress import Progress
 from .standstill import Pulse, kill_session, where_it_stands
+from .words import closing, opening
 
 log = logging.getLogger(__name__)
 
@@ -52,9 +53,11 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
         start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)
         prepare(scene, start, ranks)
         _remove_addresses(case)
+        opening(scene, start.time, f"; see log.{scene.application} and log.gbmDaemon in {case}")
         _Processes(scene, ranks, start.time, lock).run()
         if ranks > 1:
             reconstruct(case)
+        closing(scene, case)
 
 
 def run_spectral(case: Path | str, **options) -> None:

@@ -1,8 +1,10 @@
-"""What a run shows while it goes on: a bar with the time remaining on a terminal, nothing elsewhere."""
+"""What a run shows while it goes on: a bar with the time remaining on a terminal, a line now and then elsewhere."""
 
 from __future__ import annotations
 
+import logging
 import sys
+import time as clock
 from pathlib import Path
 
 from rich.console import Console
@@ -11,25 +13,30 @@ from rich.progress import Progress as Bar
 
 from ..case.layout import FIBERS, FLOW, FLOW_TABLE, RESULTS
 
+log = logging.getLogger(__name__)
+
 TAIL = 4096  # bytes of a table that surely hold its last row
+QUIET = 60.0  # between lines where there is no terminal [s]
+BAR_WIDTH = 14  # columns: the rest of 80 is for what happens
 
 
 class Progress:
-    """A context manager; `update` reads the newest rows of the run's tables and redraws."""
+    """A context manager; `update` reads the newest rows of the run's tables and shows them."""
 
     def __init__(self, scene, start_time: float):
         self._case: Path = scene.case
         self._start = start_time
         self._end = scene.end_time
         columns = (
-            TextColumn("t = {task.fields[now]}"),
-            BarColumn(),
-            TimeRemainingColumn(),
+            TextColumn("t = {task.fields[now]} of " + f"{self._end:g} s"),
+            BarColumn(BAR_WIDTH),
+            TimeRemainingColumn(compact=True),
             TextColumn("{task.fields[state]}"),
         )
         console = Console(file=sys.stderr)
         self._bar = Bar(*columns, console=console, disable=not console.is_terminal)
         self._task = self._bar.add_task("", total=self._end - self._start, now=f"{start_time:g}", state="")
+        self._said = clock.monotonic()
 
     def __enter__(self) -> Progress:
         self._bar.start()
@@ -39,18 +46,21 @@ class Progress:
         self._bar.stop()
 
     def update(self) -> None:
-        if self._bar.disable:
+        if self._bar.disable and clock.monotonic() - self._said < QUIET:
             return
         flow = newest_row(self._case, f"{FLOW}/*/{FLOW_TABLE}")
         fibers = newest_row(self._case, f"{FIBERS}/*/daemon*.dat")
         time = fibers.get("Time", flow.get("Time", self._start))
-        parts = []
-        if flow:
-            parts.append(f"k {flow['k']:.4g}  ε {flow['epsilonBudget']:.4g}  Re_λ {flow['ReLambda']:.3g}")
-        ratios = [f"{value:.3f}" for name, value in fibers.items() if name.startswith("R2_")]
+        parts = [f"Re_λ {flow['ReLambda']:.3g}"] if "ReLambda" in flow else []
+        ratios = [f"{n.removeprefix('R2_')} {r:.3f}" for n, r in fibers.items() if n.startswith("R2_")]
         if ratios:
             parts.append(f"⟨R²⟩/L² {' '.join(ratios)}")
-        self._bar.update(self._task, completed=time - self._start, now=f"{time:g}", state="  ".join(parts))
+        state = "  ".join(parts)
+        if self._bar.disable:
+            self._said = clock.monotonic()
+            log.info("t = %g of %g s  %s", time, self._end, state)
+        else:
+            self._bar.update(self._task, completed=time - self._start, now=f"{time:g}", state=state)
 
 
 def newest_row(case: Path, pattern: str) -> dict[str, float]:
