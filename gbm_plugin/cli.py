@@ -60,6 +60,12 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     def add_case(sub: argparse.ArgumentParser) -> None:
         sub.add_argument("case", nargs="?", default=".", help="OpenFOAM case (default: this folder)")
 
+    sub = add(
+        "new", _new, "Make a case of one's own, from the shipped one; without a name, list the presets."
+    )
+    sub.add_argument("case", nargs="?", help="the new folder")
+    sub.add_argument("--preset", default="default", metavar="NAME", help="whose numbers it has")
+
     sub = add("run", _run, "Run a case: flow and fibers, continuing an unfinished run.")
     add_case(sub)
     sub.add_argument("--parallel", action="store_true", help="on the MPI ranks of system/decomposeParDict")
@@ -111,6 +117,17 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
 def _add_json(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--json", metavar="FILE", help="also write the figures to FILE, as JSON")
+
+
+def _new(arguments) -> None:
+    from .case.new import PRESETS, listing, new_case
+
+    if arguments.case is None:
+        print(f"gbm new DIR --preset NAME\n{listing()}")
+        return
+    case = new_case(arguments.case, arguments.preset)
+    print(f"{case}: {PRESETS[arguments.preset].title}")
+    print(f"next: gbm info {case}; gbm run {case}")
 
 
 def _run(arguments) -> None:

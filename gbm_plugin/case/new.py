@@ -1,0 +1,120 @@
+"""`gbm new`: a case of one's own, from the shipped one, with the numbers of a preset."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..errors import CaseError, InstallationError
+from .edit import set_entries
+
+SHIPPED = Path(__file__).resolve().parents[2] / "openfoam_case"
+PARTS = ("0.orig", "constant", "system")
+
+_HEAD = """FoamFile
+{{
+    version     2.0;
+    format      ascii;
+    class       dictionary;
+    location    "{folder}";
+    object      {name};
+}}
+
+"""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What differs from the shipped case: entries by dictionary, and dictionaries with another text."""
+
+    title: str
+    entries: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
+    without: tuple[str, ...] = ()
+
+
+_FLOW_ONE_FIBERS = """rho             1;
+
+mobility        freeDrain;
+integrator      auto;
+tolerance       1e-4;
+interpolation   cubic;
+recordInterval  20;
+
+families    // d = 0.1 (3.5 eta), K^b from flexible to stiff, as in section 4 of the paper
+{
+    K1e-6   { count 100; beads 20; length 2; bendingStiffness 1e-6; seed 1; }
+    K1e-5   { count 100; beads 20; length 2; bendingStiffness 1e-5; seed 2; }
+    K1e-4   { count 100; beads 20; length 2; bendingStiffness 1e-4; seed 3; }
+    K1e-3   { count 100; beads 20; length 2; bendingStiffness 1e-3; seed 4; }
+}
+"""
+
+PRESETS = {
+    "default": Preset("the shipped case: forced turbulence, a stiff and a flexible family"),
+    "quick": Preset(
+        "the same in seconds: fewer cells, a short time",
+        {
+            "system/blockMeshDict": {"n": 24},
+            "system/controlDict": {"endTime": 4, "writeInterval": 25},
+        },
+    ),
+    "flow-I": Preset(
+        "Flow I of the paper: 128^3, Eswaran-Pope forcing, epsilon 0.0015, Re_lambda 52; hours",
+        {
+            "system/blockMeshDict": {"n": 128},
+            "constant/transportProperties": {"nu": 1e-3},
+            "system/controlDict": {"deltaT": 0.01, "endTime": 500, "writeInterval": 2000},
+            "system/initialFieldDict": {"kineticEnergy": 0.025},
+        },
+        {
+            "constant/fvOptions": "eswaranPope\n{\n    type        eswaranPope;\n    variance    5.53e-7;    // of an "
+            "amplitude [m2/s4]\n    timeScale   7.65;       // [s]\n    cutoff      3.4641;     // waves per box\n"
+            "    seed        1;\n}\n",
+            "constant/fiberProperties": _FLOW_ONE_FIBERS,
+        },
+    ),
+    "taylor-green": Preset(
+        "the decaying three-dimensional Taylor-Green vortex, without forcing",
+        {
+            "constant/transportProperties": {"nu": 0.01},
+            "system/controlDict": {"deltaT": 0.02, "endTime": 10},
+        },
+        {
+            "system/initialFieldDict": "field           taylorGreen;\nvelocity        1;              // [m/s]\n"
+        },
+        ("constant/fvOptions",),
+    ),
+}
+
+
+def new_case(target: Path | str, preset: str = "default") -> Path:
+    """Make the case `target` from the shipped one. Raises CaseError where it is there already or the preset is not
+    known, InstallationError where the shipped case is not beside the package."""
+    target = Path(target)
+    if preset not in PRESETS:
+        raise CaseError(f"there is no preset '{preset}'; allowed: {' '.join(PRESETS)}")
+    if target.exists():
+        raise CaseError(f"{target} is there already: give a folder that is not")
+    if not SHIPPED.is_dir():
+        raise InstallationError(f"the shipped case is not at {SHIPPED}: install the package from its clone")
+    changes = PRESETS[preset]
+    target.mkdir(parents=True)
+    for part in PARTS:
+        shutil.copytree(SHIPPED / part, target / part, ignore=shutil.ignore_patterns("polyMesh"))
+    for name in changes.without:
+        (target / name).unlink()
+    for name, text in changes.texts.items():
+        folder, file = name.split("/")
+        (target / name).write_text(_HEAD.format(folder=folder, name=file) + text)
+    for name, entries in changes.entries.items():
+        set_entries(target / name, entries)
+    return target
+
+
+def listing() -> str:
+    """The presets, a line each."""
+    width = max(map(len, PRESETS))
+    return "\n".join(f"    {name:<{width}}  {preset.title}" for name, preset in PRESETS.items())
