@@ -8,7 +8,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from ..errors import InstallationError, UtilityError
+from ..errors import CaseError, InstallationError, UtilityError
 from ..files import created
 from .layout import log_file
 
@@ -16,11 +16,8 @@ DEBIAN = Path("/usr/share/openfoam")
 PLUGIN = "libgbmPlugin.so"
 
 
-def environment() -> dict[str, str]:
-    """Variables for OpenFOAM's programs: a sourced OpenFOAM as it is, else Debian's package.
-
-    InstallationError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
-    """
+def _tools() -> tuple[dict[str, str], bool]:
+    """Variables for OpenFOAM's own programs, and whether they are of a sourced OpenFOAM: else Debian's package."""
     env = dict(os.environ)
     sourced = "WM_PROJECT_DIR" in env and Path(env["WM_PROJECT_DIR"]) != DEBIAN
     if not sourced:
@@ -35,6 +32,15 @@ def environment() -> dict[str, str]:
             f"OpenFOAM '{version}' is not supported: openfoam.com v1912 or later is needed "
             "(www.openfoam.com names its releases vYYMM)"
         )
+    return env, sourced
+
+
+def environment() -> dict[str, str]:
+    """Variables for OpenFOAM's programs with the plugin: a sourced OpenFOAM as it is, else Debian's package.
+
+    InstallationError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
+    """
+    env, sourced = _tools()
     own = Path(__file__).resolve().parents[2] / "build/lib"
     library = Path(env.get("FOAM_USER_LIBBIN", own)) if sourced else own  # each has its own binary interface
     if not (library / PLUGIN).is_file():
@@ -42,6 +48,31 @@ def environment() -> dict[str, str]:
     env["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, [str(library), env.get("LD_LIBRARY_PATH", "")]))
     env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return env
+
+
+def expanded(case: Path, dictionary: Path) -> str:
+    """A dictionary with its macros and directives carried out by OpenFOAM, every digit kept.
+
+    Code is not run: whatever would compile and load some is refused by OpenFOAM itself. CaseError with its words.
+    """
+    program = "foamDictionary"
+    if shutil.which(program) is None:
+        raise InstallationError(
+            f"{dictionary} has macros, for which OpenFOAM's '{program}' is needed: not on the PATH"
+        )
+    argv = [program, "-case", str(case), "-expand", "-precision", "17"]
+    argv += ["-info-switch", "allowSystemOperations=0", str(dictionary)]
+    done = subprocess.run(argv, env=_tools()[0], stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    if done.returncode == 0:
+        return done.stdout
+    words = done.stdout + done.stderr
+    if "dynamicCode" in words:
+        raise CaseError(
+            f"{dictionary}: #calc or #codeStream in what it includes runs code, which gbm does not"
+        )
+    raise CaseError(
+        f"{dictionary} is not read by OpenFOAM: {fatal_text(words) or f'exit code {done.returncode}'}"
+    )
 
 
 def command(program: str, case: Path, ranks: int = 1) -> list[str]:
@@ -73,13 +104,16 @@ def utility(case: Path, program: str, *options: str) -> None:
 
 def fatal_message(log: Path) -> str | None:
     """The text of the first FOAM FATAL ERROR of a log, in one line; None where there is none."""
-    if not log.is_file():
-        return None
-    text = log.read_text(errors="replace")
+    return fatal_text(log.read_text(errors="replace")) if log.is_file() else None
+
+
+def fatal_text(text: str) -> str | None:
     match = re.search(r"--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\n\s*From |\Z)", text, re.DOTALL)
     if match is None:
         return None
     lines = [re.sub(r"^\[\d+\]\s?", "", line).strip() for line in match.group(1).splitlines()]
     message = " ".join(line for line in lines if line)
-    where = re.search(r"^(?:\[\d+\]\s)?file: (.+?) (?:from|at) line", text[match.end(1) :], re.MULTILINE)
-    return f"{message} (in {where.group(1)})" if where else message
+    where = re.search(
+        r"^(?:\[\d+\]\s)?file: (.+?) (?:from|at) (line \d+)", text[match.end(1) :], re.MULTILINE
+    )
+    return f"{message} (in {where[1]}, {where[2]})" if where else message

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import CaseError
 from .dictionary import Dictionary
+from .positions import read_positions
 from .share import Share
 
 INTEGRATORS = ("ab3", "implicit", "auto")
@@ -204,19 +205,20 @@ def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:
 
 
 def _read_family(case: Path, name: str, d: Dictionary, model: Model) -> Family:
+    model = _read_model(d, model)
     shape = d.word("shape", SHAPES, "straight")
     positions = None
     if shape == "file":
         positions = _read_positions(case, d)
         count, beads = positions.shape[:2]
-        length = beads * float(np.linalg.norm(positions[0, 1] - positions[0, 0]))
+        length = beads * float(np.linalg.norm(np.diff(positions, axis=1), axis=2).mean())
         seed = 0
     else:
         count, beads = d.integer("count", least=1), d.integer("beads", least=2)
-        length = _read_length(d, beads)
         seed = d.integer("seed", 1, least=0)
+        length = _read_length(d, beads)
     stiffness = _read_stiffness(d, length / beads)
-    family = Family(name, count, beads, length, stiffness, seed, shape, _read_model(d, model), positions)
+    family = Family(name, count, beads, length, stiffness, seed, shape, model, positions)
     d.done()
     return family
 
@@ -224,33 +226,20 @@ def _read_family(case: Path, name: str, d: Dictionary, model: Model) -> Family:
 def _read_positions(case: Path, d: Dictionary) -> np.ndarray:
     path = case / d.word("positions")
     try:
-        positions = np.load(path, allow_pickle=False).astype(float)
-    except (OSError, ValueError) as error:
-        raise d.fail(
-            "positions", f"names {path}, which cannot be read as a NumPy .npy file: {error}"
-        ) from None
-    if positions.ndim != 3 or positions.shape[1] < 2 or positions.shape[2] != 3:
-        raise d.fail(
-            "positions", f"has shape {positions.shape}; (fibers, beads, 3) with 2 beads or more is needed"
-        )
-    return positions
+        return read_positions(path)
+    except ValueError as error:
+        raise d.fail("positions", f"names {path}, which {error}") from None
 
 
 def _read_length(d: Dictionary, beads: int) -> float:
-    length = d.number("length", None, above=0)
-    radius = d.number("radius", None, above=0)
-    if (length is None) == (radius is None):
-        raise CaseError(f"{d.where}: exactly one of the entries 'length' (2 a N) and 'radius' (a) is needed")
+    length, radius = d.either("length", "radius", "'length' (2 a N) and 'radius' (a)", above=0)
     return length if length is not None else 2 * radius * beads
 
 
 def _read_stiffness(d: Dictionary, diameter: float) -> float:
-    stiffness = d.number("bendingStiffness", None, least=0)
-    modulus = d.number("youngModulus", None, least=0)
-    if (stiffness is None) == (modulus is None):
-        raise CaseError(
-            f"{d.where}: exactly one of the entries 'bendingStiffness' (K^b) and 'youngModulus' is needed"
-        )
+    stiffness, modulus = d.either(
+        "bendingStiffness", "youngModulus", "'bendingStiffness' (K^b) and 'youngModulus'", least=0
+    )
     return stiffness if stiffness is not None else modulus * math.pi * diameter**4 / 64  # eq. (10)
 
 

@@ -167,7 +167,8 @@ class TcpListener(SocketListener):
         self.token = secrets.token_hex(16)
         self.path = case / share.name("gbm", ".tcp")
         try:
-            self.server = socket.create_server((coupling.host, coupling.port), backlog=4)
+            family = socket.getaddrinfo(coupling.host, coupling.port, type=socket.SOCK_STREAM)[0][0]
+            self.server = socket.create_server((coupling.host, coupling.port), family=family, backlog=4)
         except OSError as error:
             raise CouplingError(
                 f"cannot listen on {coupling.host} port {coupling.port}: {error.strerror}"
