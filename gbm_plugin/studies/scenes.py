@@ -41,6 +41,26 @@ def scene_copy(
     return copy
 
 
+FAMILIES = """recordInterval {record};
+integrator auto;
+tolerance {tolerance:g};
+interpolation {interpolation};
+families
+{{
+    stiff {{ count {count}; beads 20; length 1.5; bendingStiffness 1e-2; seed 1; }}
+    medium {{ count {count}; beads 20; length 1.5; bendingStiffness 1e-3; seed 2; }}
+    soft {{ count {count}; beads 20; length 1.5; bendingStiffness 1e-4; seed 3; }}
+}}
+"""
+
+
+def three_families(count: int, record: int, tolerance: float, interpolation: str) -> str:
+    """The text of a fiberProperties: fibers that hardly bend, that bend, and that fold in the studies' flows.
+
+    record: steps between records."""
+    return FAMILIES.format(count=count, record=record, tolerance=tolerance, interpolation=interpolation)
+
+
 def checked_cells(cells: Sequence[int], least: int = 8) -> Sequence[int]:
     """The cells, or ValueError where one is odd, too small, or there twice."""
     if not cells or len(set(cells)) < len(cells) or any(n < least or n % 2 for n in cells):

@@ -20,22 +20,11 @@ from ...output.field import read_velocity
 from ...output.recording import open_recording
 from ...run.openfoam import run as run_openfoam
 from ...run.openfoam import run_spectral
-from ..scenes import rms, scene_copy
+from ..scenes import rms, scene_copy, three_families
 
 FLOW = """field random; spectrum table; table ((1 0.08) (2 0.12) (3 0.05)); seed {seed};
 """
 FORCING = """linearForcing { type linearForcing; mode constantPower; power 0.05; }
-"""
-FIBERS = """recordInterval {steps};
-integrator auto;
-tolerance 1e-6;
-interpolation {interpolation};
-families
-{{
-    stiff {{ count 50; beads 20; length 1.5; bendingStiffness 1e-2; seed 1; }}
-    medium {{ count 50; beads 20; length 1.5; bendingStiffness 1e-3; seed 2; }}
-    soft {{ count 50; beads 20; length 1.5; bendingStiffness 1e-4; seed 3; }}
-}}
 """
 END_TIME = 1.2  # half a turnover: k/eps of this flow, at its start, is 2.5 s
 VISCOSITY = 0.03  # Kolmogorov length 0.15: 24 cells are 1.8 of it wide
@@ -88,7 +77,7 @@ def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str) -> 
     """Run a copy from `make` in "openfoam" or "spectral". interpolation: of the flow at the beads. Raises as
     `gbm_plugin.run.openfoam.run`."""
     spectral = engine == "spectral"
-    words = FIBERS.format(steps=steps, interpolation=interpolation)
+    words = three_families(50, steps, 1e-6, interpolation)
     (copy / "constant/fiberProperties").write_text(HEADER + words)
     (run_spectral if spectral else run_openfoam)(copy)
     folder = copy / "spectral" if spectral else copy

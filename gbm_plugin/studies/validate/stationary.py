@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from ...run.openfoam import run as run_openfoam
 from ...run.openfoam import run_spectral
 from ..figures import stationary_figure
-from ..scenes import checked_cells, checked_step, scene_copy
+from ..scenes import checked_cells, checked_step, scene_copy, three_families
 from ..study import option
 from .averages import BLOCKS, Averages, averages, curve, density
 from .comparison import sampling_word
@@ -27,17 +27,6 @@ from .comparison import sampling_word
 FLOW = """field random; spectrum peaked; kineticEnergy 0.22; peakWavenumber 2; maxWavenumber 5; seed 1;
 """
 FORCING = """linearForcing { type linearForcing; mode constantPower; power 0.05; }
-"""
-FIBERS = """recordInterval {record};
-integrator auto;
-tolerance 1e-4;
-interpolation {interpolation};
-families
-{{
-    stiff {{ count 80; beads 20; length 1.5; bendingStiffness 1e-2; seed 1; }}
-    medium {{ count 80; beads 20; length 1.5; bendingStiffness 1e-3; seed 2; }}
-    soft {{ count 80; beads 20; length 1.5; bendingStiffness 1e-4; seed 3; }}
-}}
 """
 VISCOSITY = 0.02  # Kolmogorov length 0.112: 36 cells are 1.55 of it wide, 24 are 2.3
 TURNOVER = 4.2  # about k/eps of this flow [s]; one field is written in each
@@ -203,7 +192,7 @@ def solve(case: Path, folder: Path, engine: str, cells: int, time_step: float, t
         texts={
             "system/initialFieldDict": FLOW,
             "constant/fvOptions": FORCING,
-            "constant/fiberProperties": FIBERS.format(record=record, interpolation=word),
+            "constant/fiberProperties": three_families(80, record, 1e-4, word),
         },
     )
     (run_openfoam if engine == "openfoam" else run_spectral)(copy)
