@@ -19,6 +19,8 @@ from gbm_plugin.output.recording import Recorder
 
 from sample_records import FAMILIES, SCENE, records
 
+pytest_plugins = ("selection", "hang")
+
 DEFAULT_CASE = Path(__file__).parents[1] / "openfoam_case"
 
 # solver tolerances at which runs on different ranks can be compared

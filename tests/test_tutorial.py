@@ -6,7 +6,11 @@ import os
 import re
 from pathlib import Path
 
+import pytest
+
 from conftest import make_case, run_case
+
+pytestmark = pytest.mark.openfoam
 
 TUTORIAL = Path(__file__).parents[1] / "docs/tutorial.md"
 

@@ -219,6 +219,7 @@ def small(tmp_path):
     return make_case(tmp_path / "case", cells=12, steps=20, write_every=5, tight=False)
 
 
+@pytest.mark.openfoam
 def test_interpolation_that_openfoam_does_not_know(small):
     set_entry(small / FIBERS, "interpolation", "spline")
     line = refused(small)
@@ -226,6 +227,7 @@ def test_interpolation_that_openfoam_does_not_know(small):
     assert "cellPoint" in line and FIBERS in line and "log.pimpleFoam" in line
 
 
+@pytest.mark.openfoam
 def test_mesh_that_is_not_periodic(small):
     edit(small / "system/blockMeshDict", "zLow    { type cyclic; neighbourPatch zHigh;", "zLow { type wall;")
     edit(small / "system/blockMeshDict", "zHigh   { type cyclic; neighbourPatch zLow;", "zHigh { type wall;")
@@ -240,6 +242,7 @@ def test_mesh_that_is_not_periodic(small):
     assert "periodic (cyclic) in all three directions" in line and "log.pimpleFoam" in line
 
 
+@pytest.mark.openfoam
 def test_mesh_that_is_not_a_box(small):
     """A parallelepiped: translations still map its faces onto each other."""
     mesh = small / "system/blockMeshDict"
@@ -260,11 +263,13 @@ def test_mesh_that_is_not_a_box(small):
     assert "is a whole, axis-aligned box" in line
 
 
+@pytest.mark.openfoam
 def test_program_that_is_not_there(small):
     set_entry(small / CONTROL, "application", "cimpleFoam")
     assert "the OpenFOAM program 'cimpleFoam' is not on the PATH" in refused(small)
 
 
+@pytest.mark.openfoam
 def test_no_initial_field_and_no_mesh(small):
     for folder in ("0", "constant/polyMesh"):
         (small / folder).rename(small / "system" / folder.replace("/", "."))
@@ -275,11 +280,13 @@ def test_no_initial_field_and_no_mesh(small):
     assert "blockMeshDict" in refused(small)
 
 
+@pytest.mark.openfoam
 def test_too_many_fibers_for_the_memory(small):
     edit(small / FIBERS, "count 12;", "count 100000000000;")
     assert "not enough memory" in refused(small)
 
 
+@pytest.mark.openfoam
 def test_nan_in_the_flow(small):
     """Named with its time; what was recorded before stays."""
     set_entry(small / CONTROL, "endTime", "0.1")
@@ -297,6 +304,7 @@ def test_nan_in_the_flow(small):
         assert np.isfinite(recording.families["test"].positions[:]).all()
 
 
+@pytest.mark.openfoam
 def test_time_step_that_is_far_too_long(small):
     """OpenFOAM or the daemon says so before anything infinite is recorded."""
     set_entry(small / CONTROL, "deltaT", "5")

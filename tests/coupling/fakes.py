@@ -31,10 +31,7 @@ def start_gbm(*arguments, **options) -> subprocess.Popen:
     """The command line in the background, what it says in one pipe."""
     return subprocess.Popen(
         [sys.executable, "-m", "gbm_plugin.cli", *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        **options,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **options},
     )
 
 

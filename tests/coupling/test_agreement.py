@@ -9,6 +9,8 @@ from gbm_plugin.output.recording import open_recording
 
 from conftest import divide, make_case, run_case
 
+pytestmark = pytest.mark.openfoam
+
 STEPS = 20
 BOX = 2 * np.pi
 

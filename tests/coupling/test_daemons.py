@@ -21,6 +21,8 @@ from gbm_plugin.output.recording import open_recording
 from conftest import divide, gbm, make_case, run_case, set_entry, start_solver
 from fakes import children, kill_all_of, last_step, start_gbm, until
 
+pytestmark = pytest.mark.openfoam
+
 STEPS, TIME_STEP = 20, 0.02
 FAMILIES = """
     soft { count 7; beads 6; length 1.2; bendingStiffness 1e-5; seed 3; }

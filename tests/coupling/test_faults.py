@@ -33,6 +33,8 @@ from fakes import (
     until,
 )
 
+pytestmark = pytest.mark.openfoam
+
 TIMEOUT = 1.5
 NAN = float("nan")
 

@@ -13,6 +13,8 @@ from gbm_plugin.output.tables import read_dat
 
 from conftest import make_case, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 STEPS = 15
 SLOW_DAEMON = Path(__file__).with_name("slow_daemon.py")
 

@@ -15,6 +15,8 @@ from gbm_plugin.output.tables import read_dat
 from conftest import gbm, make_case, run_case, set_entry
 from fakes import Run, kill_all_of
 
+pytestmark = pytest.mark.openfoam
+
 STEPS, TIME_STEP = 20, 0.02
 SCHEMES = ("Euler", "backward", "CrankNicolson 0.9")
 

@@ -12,6 +12,8 @@ from gbm_plugin.case.openfoam import utility
 from conftest import divide, set_entry
 from probe import probe
 
+pytestmark = pytest.mark.openfoam
+
 BOX = 2 * np.pi
 CELLS = 16
 

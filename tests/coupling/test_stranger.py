@@ -7,7 +7,11 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from conftest import make_case, start_solver
+
+pytestmark = pytest.mark.openfoam
 
 
 def test_a_silent_stranger_on_tcp(tmp_path):

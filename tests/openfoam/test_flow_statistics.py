@@ -15,6 +15,8 @@ from gbm_plugin.output.tables import read_dat
 
 from conftest import divide, make_case, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 NU, CELLS, STEPS, TIME = 0.01, 12, 4, "0.08"
 POWER = "linearForcing { type linearForcing; mode constantPower; power 0.05; }"
 FACE_SUMS = ("Gauss linear", "orthogonal")

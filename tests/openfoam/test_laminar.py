@@ -13,6 +13,8 @@ from gbm_plugin.output.tables import read_dat
 
 from conftest import HEADER, make_case, set_entry, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 NU = 0.01
 FORCING = "linearForcing { type linearForcing; mode constantCoefficient; A 0; }"  # its statistics alone
 MODELS = {"ours": "constantViscosity", "stock": "Stokes"}

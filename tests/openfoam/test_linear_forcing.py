@@ -9,6 +9,8 @@ from gbm_plugin.output.tables import read_dat
 
 from conftest import HEADER, make_case, set_entry, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 A, NU, CELLS = 0.5, 0.01, 16
 UNIFORM = "((0 0 0) (0.3 -0.2 0.1) (0 0 0))"
 SHEAR = "((0 2 0) (0 0 0) (-1 0 0))"  # u_x = sin 2y: an exact solution, as u . grad u = 0

@@ -14,6 +14,8 @@ from gbm_plugin.output.recording import open_recording
 
 from conftest import DEFAULT_CASE, FAMILY, HEADER, gbm, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 README = Path(__file__).parents[2] / "README.md"
 
 

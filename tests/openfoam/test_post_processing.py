@@ -13,6 +13,8 @@ from gbm_plugin.output.recording import open_recording
 
 from conftest import gbm, make_case, run_case
 
+pytestmark = pytest.mark.openfoam
+
 FAMILIES = """
     soft { count 5; beads 6; length 1.2; bendingStiffness 1e-5; seed 3; }
     stiff { count 3; beads 4; radius 0.1; youngModulus 40; seed 4; }

@@ -16,6 +16,8 @@ from gbm_plugin.case.openfoam import fatal_message, utility
 
 from conftest import HEADER, make_case, set_entry, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 STEPS = 3
 TIME = "0.06"
 FFT = "solver PCG; preconditioner periodicFFT; tolerance 1e-12; relTol 0;"

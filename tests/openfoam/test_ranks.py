@@ -12,6 +12,8 @@ from gbm_plugin.case.openfoam import fatal_message
 from conftest import DEFAULT_CASE, divide, make_case, start_solver
 from probe import probe
 
+pytestmark = pytest.mark.openfoam
+
 LAYERS = 20
 UNEVEN = [(3, "x"), (3, "y"), (3, "z"), (7, "z")]
 ALL = [(ranks, d) for ranks in range(2, 9) for d in "xyz"]

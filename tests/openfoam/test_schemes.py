@@ -10,6 +10,8 @@ from gbm_plugin.case.openfoam import utility
 
 from conftest import divide, make_case, set_entry, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 STEPS, TIME = 5, "0.1"
 
 

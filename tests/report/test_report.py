@@ -37,6 +37,7 @@ def read_csv(path):
 
 
 @needs_mesh
+@pytest.mark.openfoam
 def test_whole_report(case):
     key = report(case)
     folder = case / "report"
@@ -77,6 +78,7 @@ def test_whole_report(case):
 
 
 @needs_mesh
+@pytest.mark.openfoam
 def test_velocity_has_x_fastest_and_the_mesh_its_cells(case):
     cells, origin, size = field.box_mesh(case)
     assert cells == (16, 16, 16)
@@ -151,6 +153,7 @@ def test_nothing_to_report(tmp_path):
 
 
 @needs_mesh
+@pytest.mark.openfoam
 def test_decomposed_case_is_read(case, tmp_path):
     """U only in processor folders: fluidfoam puts it together by the cells' addresses."""
     copy = tmp_path / "case"
@@ -179,6 +182,7 @@ def test_decomposed_case_is_read(case, tmp_path):
 
 
 @needs_mesh
+@pytest.mark.openfoam
 def test_restarted_run_gives_one_series(case, tmp_path):
     with open_recording(case / "postProcessing/fibers") as recording:
         np.testing.assert_allclose(recording.times, 0.05 * np.arange(41), atol=1e-12)

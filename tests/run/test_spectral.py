@@ -32,6 +32,7 @@ def whole(tmp_path_factory):
     return path
 
 
+@pytest.mark.openfoam
 def test_both_engines_agree(whole, tmp_path):
     """The same initial modes, forcing and seeds; after 0.4 time units apart by the error of 24^3 cells."""
     path = make_case(tmp_path / "case", cells=24, tight=False)

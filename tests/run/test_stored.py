@@ -21,6 +21,8 @@ from gbm_plugin.run.openfoam import run_stored
 
 from conftest import divide, gbm, make_case, run_case, set_entry
 
+pytestmark = pytest.mark.openfoam
+
 REPLAY = ("--flow", "stored")
 STEPS = 12
 # shear waves, each free of divergence in any box

@@ -8,6 +8,8 @@ import pytest
 
 from conftest import DEFAULT_CASE, gbm
 
+pytestmark = pytest.mark.openfoam
+
 
 @pytest.mark.parametrize("ranks, daemons", [(1, 1), (2, 2)])
 def test_shares_of_a_step(tmp_path, ranks, daemons):

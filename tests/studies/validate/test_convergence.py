@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from gbm_plugin.studies.validate import convergence
 
 from conftest import DEFAULT_CASE
+
+pytestmark = pytest.mark.openfoam
 
 
 def test_flow_and_fibers_converge_at_second_order(second_order):

@@ -9,6 +9,8 @@ from gbm_plugin.studies.validate import replay
 
 from conftest import DEFAULT_CASE
 
+pytestmark = pytest.mark.openfoam
+
 
 def test_distance_to_the_coupled_run_by_interval():
     """Every field: the run itself. Every k-th: the mean of the error over the steps between two fields, of which

@@ -8,6 +8,8 @@ from gbm_plugin.studies.validate import schemes
 
 from conftest import DEFAULT_CASE
 
+pytestmark = pytest.mark.openfoam
+
 
 def test_what_is_known_of_schemes():
     """Implicit Euler is of first order and two outer correctors do not cure it; values averaged to

@@ -9,6 +9,8 @@ from gbm_plugin.studies.validate import stationary
 
 from conftest import DEFAULT_CASE
 
+pytestmark = pytest.mark.openfoam
+
 POWER = 0.05
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from gbm_plugin.output.tables import read_dat
 from gbm_plugin.studies.validate import steady
 
 from conftest import make_case, run_case, set_entry
+
+pytestmark = pytest.mark.openfoam
 
 
 def test_fibers_converge_to_those_in_the_analytic_flow(second_order):

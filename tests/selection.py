@@ -1,0 +1,28 @@
+"""Which tests run: `pytest` alone those of pure Python, `pytest FILES` all in them, `pytest --all` every one.
+
+What needs OpenFOAM or takes long says so by a marker. A -m or -k of one's own is taken as it is.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+LEFT_OUT = ("openfoam", "slow")  # of a run that names nothing
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--all", action="store_true", help="also tests that need OpenFOAM or take long")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    named = config.args_source is not pytest.Config.ArgsSource.TESTPATHS
+    if named or config.option.markexpr or config.option.keyword:
+        config.option.all = True  # xdist hands the options to its workers
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.option.all:
+        return
+    left_out = [item for item in items if any(item.get_closest_marker(name) for name in LEFT_OUT)]
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = [item for item in items if item not in set(left_out)]
