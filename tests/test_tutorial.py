@@ -16,7 +16,7 @@ TUTORIAL = Path(__file__).parents[1] / "docs/tutorial.md"
 
 
 def test_every_block_of_python(tmp_path):
-    path = make_case(tmp_path / "openfoam_case", steps=10, prepared=False)
+    path = make_case(tmp_path / "mycase", steps=10, prepared=False)
     run_case(path)
     blocks = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
     assert len(blocks) == 2
