@@ -155,7 +155,7 @@ def test_nothing_to_report(tmp_path):
 @needs_mesh
 @pytest.mark.openfoam
 def test_decomposed_case_is_read(case, tmp_path):
-    """U only in processor folders: fluidfoam puts it together by the cells' addresses."""
+    """U only in processor folders: put together by the cells' addresses."""
     copy = tmp_path / "case"
     shutil.copytree(case, copy)
     velocity = random_flow(16)
