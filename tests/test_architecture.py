@@ -12,10 +12,10 @@ PACKAGE = Path(__file__).parents[1] / "gbm_plugin"
 
 # from the ground up; folders of one line do not know each other, but for the words of the fiber model
 FLOORS = [
-    {"errors", "files"},
+    {"errors", "files", "compiled"},
     {"fiber", "flow", "case", "statistics"},
     {"spectral", "output"},
-    {"report", "fleet"},
+    {"report", "fleet", "prepare"},
     {"coupling"},
     {"run"},
     {"studies"},

@@ -11,7 +11,9 @@ import contextlib
 import logging
 import secrets
 import signal
+import threading
 import time as clock
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,7 @@ from ..case.lock import DAEMON, locked
 from ..case.scene import Scene, read_scene
 from ..case.share import Share
 from ..errors import CaseError, CouplingError, StateError
-from ..fleet.fleet import Fleet
+from ..fleet.fleet import Fleet, prepare_kernels
 from ..fleet.journal import Journal
 from .channel import Channel, Listener
 from .listen import listen
@@ -42,6 +44,7 @@ from .message import (
 log = logging.getLogger(__name__)
 
 HELLO_TIMEOUT = 5.0  # a solver says HELLO at once [s]
+WAIT_INTERVAL = 2.0  # between words to a solver that waits for WELCOME [s]; shorter than any timeout of use
 
 
 def serve(case: Path | str, number: int | None = None) -> None:
@@ -134,6 +137,26 @@ def _say_why(channel: Channel, text: str) -> None:
         channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()))
 
 
+@contextlib.contextmanager
+def _patience(channel: Channel, first: Message) -> Iterator[None]:
+    """What is done inside may take longer than the solver's patience: now and then it is told to wait."""
+    done = threading.Event()
+
+    def tell() -> None:
+        while not done.wait(WAIT_INTERVAL):
+            with contextlib.suppress(CouplingError):  # of a solver that is gone the next message tells
+                text = b"the daemon prepares its kernels and fibers"
+                channel.send(Message(Kind.WAIT, first.step, first.time, text))
+
+    teller = threading.Thread(target=tell, name="patience")
+    teller.start()
+    try:
+        yield
+    finally:
+        done.set()
+        teller.join()
+
+
 class Session:
     """One run of the solver, from HELLO to GOODBYE."""
 
@@ -147,7 +170,9 @@ class Session:
         self._check(hello)
         self.step, self.time = first.step, first.time
         self.time_step = hello.time_step
-        self.fleet = self._fibers(hello)
+        with _patience(self.channel, first):
+            prepare_kernels(self.scene.families)
+            self.fleet = self._fibers(hello)
         self.journal = Journal(
             self.scene,
             self.fleet,

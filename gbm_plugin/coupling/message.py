@@ -33,6 +33,7 @@ class Kind(enum.IntEnum):
     END = 6  # flow -> fibers: no more steps
     GOODBYE = 7  # fibers -> flow: everything is on disk
     ERROR = 8  # either way: one line, then the connection ends
+    WAIT = 9  # fibers -> flow: one line, why WELCOME takes longer
 
 
 class ProtocolError(Exception):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
-from .layout import COPYING, pack, threads_for, unpack
+from ..compiled import kernel
+from .layout import pack, unpack
 from .simd import LANES
+from .threads import COPYING, in_shares
 
 SAMPLES = 3  # in the polynomial in time
 KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction
@@ -22,10 +23,10 @@ def lagrange_weights(times, time: float) -> np.ndarray:
     return weights
 
 
-@njit(parallel=True, cache=True)
-def _squared_gap(new, first, second, third, weights, square):
+@kernel
+def _squared_gap(share, shares, new, first, second, third, weights, square):
     """Sum over the rows of a fiber of (new − weighted predictors)², fields in blocks (B, rows, LANES)."""
-    for b in prange(new.shape[0]):
+    for b in range(share, new.shape[0], shares):
         for row in range(new.shape[1]):
             for lane in range(LANES):
                 predicted = weights[0] * first[b, row, lane] + weights[1] * second[b, row, lane]
@@ -78,8 +79,8 @@ class Ambient:
         predictors = [velocity for velocity, _ in earlier] + [earlier[0][0]] * (SAMPLES - len(earlier))
         new = self.samples[-1][0]
         square = np.zeros((len(new), LANES))
-        with threads_for(COPYING * self.shape[0] * self.shape[1]):
-            _squared_gap(new, *predictors, weights, square)
+        beads = self.shape[0] * self.shape[1]
+        in_shares(_squared_gap, COPYING * beads, new, *predictors, weights, square)
         return np.sqrt(square.reshape(-1)[: self.shape[0]] / self.shape[1])
 
     def state(self) -> dict[str, np.ndarray]:

@@ -8,9 +8,9 @@ the ½.
 """
 
 import numpy as np
-from numba import njit
 
-from .simd import cross, dot, larger, scale, splat
+from ..compiled import inlined
+from .simd import arithmetic, cross, dot, larger, scale
 
 CURVATURE_LAWS = ("sine", "discreteRod")
 TORQUES = {"consistent": 0.5, "asPrinted": 1.0}
@@ -32,10 +32,27 @@ def velocity_scale(fibers) -> np.ndarray:
     return stiffness / (16 * np.pi * fibers.viscosity * fibers.radius**3)
 
 
-@njit(forceinline=True)
+@arithmetic
+def rod_factor(t, u):
+    """2/(1 + cos θ) of the links t and u, finite at a fold."""
+    return 2.0 / larger(1.0 + dot(t, u), FOLD)
+
+
+@arithmetic
+def sine_moment(t, u):
+    """Moment between links t and u in units of K/2a, of the paper's law."""
+    return cross(t, u)
+
+
+@arithmetic
+def rod_moment(t, u):
+    """The same of a discrete rod."""
+    return scale(rod_factor(t, u), cross(t, u))
+
+
+@inlined
 def moment(t, u, law):
     """Moment between links t and u in units of K/2a; law 0 is "sine", 1 is "discreteRod"."""
-    bend = cross(t, u)
     if law == 1:
-        bend = scale(2.0 / larger(1.0 + dot(t, u), splat(FOLD)), bend)
-    return bend
+        return rod_moment(t, u)
+    return sine_moment(t, u)

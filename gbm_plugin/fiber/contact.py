@@ -1,25 +1,37 @@
 """Beads of one fiber that meet without being neighbours: counted, and pushed apart if asked to."""
 
 import numpy as np
-from numba import njit, prange
+
+from ..compiled import inlined, kernel, only_read
+from .threads import in_shares
 
 
-@njit(parallel=True, cache=True)
-def _count(positions, diameter, counts):
-    for f in prange(positions.shape[0]):
+@inlined
+def _between(positions, f, i, j):
+    """From bead j to bead i of fiber f."""
+    return (
+        positions[f, i, 0] - positions[f, j, 0],
+        positions[f, i, 1] - positions[f, j, 1],
+        positions[f, i, 2] - positions[f, j, 2],
+    )
+
+
+@kernel
+def _count(share, shares, positions, diameter, counts):
+    for f in range(share, positions.shape[0], shares):
         for i in range(positions.shape[1]):
             for j in range(i + 2, positions.shape[1]):
-                x = positions[f, i] - positions[f, j]
+                x = _between(positions, f, i, j)
                 if x[0] ** 2 + x[1] ** 2 + x[2] ** 2 < diameter**2:
                     counts[f] += 1
 
 
-@njit(parallel=True, cache=True)
-def _push(positions, diameter, rate, velocity):
-    for f in prange(positions.shape[0]):
+@kernel
+def _push(share, shares, positions, diameter, rate, velocity):
+    for f in range(share, positions.shape[0], shares):
         for i in range(positions.shape[1]):
             for j in range(i + 2, positions.shape[1]):
-                x = positions[f, i] - positions[f, j]
+                x = _between(positions, f, i, j)
                 r = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
                 if 0 < r < diameter:
                     push = 0.5 * rate * (diameter / r - 1)
@@ -31,7 +43,8 @@ def _push(positions, diameter, rate, velocity):
 def self_contacts(positions: np.ndarray, diameter: float) -> np.ndarray:
     """(F,) number of pairs of beads that overlap and are not neighbours; positions (F, N, 3)."""
     counts = np.zeros(len(positions), dtype=np.int64)
-    _count(np.ascontiguousarray(positions), diameter, counts)
+    positions = only_read(np.asarray(positions, dtype=float))
+    in_shares(_count, positions.shape[1] * counts.size, positions, diameter, counts)
     return counts
 
 
@@ -42,5 +55,6 @@ def repulsion_velocity(positions: np.ndarray, diameter: float, rate: float) -> n
     bead's own drag, is evaluated with the flow sample, and needs rate × flow step below about 1.
     """
     velocity = np.zeros(positions.shape)
-    _push(np.ascontiguousarray(positions), diameter, rate, velocity)
+    positions = only_read(np.asarray(positions, dtype=float))
+    in_shares(_push, velocity.size / 3, positions, diameter, rate, velocity)
     return velocity

@@ -14,11 +14,13 @@ and rolling, v_i − a e_i×ω_i = v_(i+1) + a e_i×ω_(i+1), gives for every li
 The matrix is symmetric positive definite; it is solved by block elimination.
 """
 
-from numba import njit
+from numba.extending import register_jitable
 
+from ..compiled import inlined, part
 from .bending import moment
+from .blocks import take
 from .layout import difference, mean_vector
-from .matrix3 import apply_symmetric, inverse_symmetric, load6
+from .matrix3 import apply_symmetric, inverse_symmetric
 from .simd import (
     add,
     add_scaled,
@@ -26,16 +28,23 @@ from .simd import (
     dot,
     larger,
     load3,
+    load6,
     scale,
     splat,
-    store,
     store3,
+    store6,
     subtract,
     zero3,
 )
 
 
-@njit(forceinline=True)
+@register_jitable
+def layout(work, beads):
+    """The inverse pivots of the links, in scratch."""
+    return take(work, 0, 6 * (beads - 1))
+
+
+@inlined
 def _pivot(e, p, alpha, x):
     """Diagonal block of link e minus B X Bᵀ, X the inverse pivot of the link p before it."""
     y = apply_symmetric(x, e)
@@ -51,14 +60,14 @@ def _pivot(e, p, alpha, x):
     )
 
 
-@njit
-def link_rates(state, velocity, rotation, beta, radius, law, pivots, multipliers, rates):
-    """Rotation rates of the links and, in the last place, the velocity of the centre of mass: (3N, LANES).
-
-    multipliers (3(N−1), LANES) receives λ; pivots (6(N−1), LANES) is scratch. Returns the largest |e·λ|, the
-    tension in units of 6πμa × velocity.
-    """
+@part
+def link_rates(chain, flow, work, motion):
+    """Motion of a Chain in a Flow; work: scratch. Returns the largest |e·λ|², the tension over 6πμa."""
+    state, beta, radius, law = chain
+    velocity, rotation = flow
+    rates, multipliers = motion
     links = rates.shape[0] // 3 - 1
+    pivots, _ = layout(work, links + 1)
     e = load3(state, 0)
     before = zero3()  # moments at the beads i − 1, i, i + 1
     here = zero3()
@@ -66,7 +75,8 @@ def link_rates(state, velocity, rotation, beta, radius, law, pivots, multipliers
     if links > 1:
         after = moment(e, load3(state, 1), law)
     spin = load3(rotation, 0)
-    p, x, r = e, (splat(0.0), splat(0.0), splat(0.0), splat(0.0), splat(0.0), splat(0.0)), zero3()
+    none = splat(0.0)
+    p, x, r = e, (none, none, none, none, none, none), zero3()
     for i in range(links):
         beyond = zero3()
         if i + 2 < links:
@@ -79,8 +89,7 @@ def link_rates(state, velocity, rotation, beta, radius, law, pivots, multipliers
         z = apply_symmetric(x, r)
         r = add_scaled(add_scaled(right, -1.0 * alpha, z), 0.75 * dot(e, z), p)
         x = inverse_symmetric(_pivot(e, p, alpha, x))
-        for c in range(6):
-            store(pivots, 6 * i + c, x[c])
+        store6(pivots, i, x)
         store3(multipliers, i, r)
         before, here, after, spin = here, after, beyond, next_spin
         p = e

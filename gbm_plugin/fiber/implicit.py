@@ -12,24 +12,18 @@ stage j solves k = f + h d J (k + κ) at its own links, so that nothing stiff is
 Every fiber has its own step inside the flow step: rejected ones try again with less, accepted ones go on.
 """
 
-import numpy as np
-from numba import njit, prange
+from typing import Any, NamedTuple
 
+import numpy as np
+from numba.extending import register_jitable
+
+from ..compiled import inlined, kernel, part, woven
+from . import implicit_drain, rpy
 from .ab3 import turn_links
 from .ambient import SAMPLES
-from .mobility import stage, work_rows
-from .simd import (
-    LANES,
-    add,
-    add_scaled,
-    dot,
-    load,
-    load3,
-    smaller,
-    splat,
-    sqrt,
-    store,
-)
+from .blocks import Ahead, Chain, Flow, Motion, rows_of, take
+from .mobility import work_rows
+from .simd import LANES, add, add_scaled, dot, load, load3, smaller, splat, sqrt, store
 
 D = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
@@ -38,12 +32,71 @@ RIGID = 2e7  # largest σβ: bending rates above 1e9/h follow the flow no closer
 FLOW_TIMES = np.array([D, 0.5, 1 - D])  # of the stages, in steps
 
 
-def scratch_rows(mobility: int, beads: int) -> int:
+class Ends(NamedTuple):
+    """Links and centre (B, 3N, LANES) and multipliers (B, 3(N−1), LANES) at one end of a step."""
+
+    links: np.ndarray
+    multipliers: np.ndarray
+
+
+class Pace(NamedTuple):
+    """Per fiber, (F,): trial, the step to try; elapsed, step, error: time reached in the flow step, suggested next
+    step, and error estimate."""
+
+    trial: np.ndarray
+    elapsed: np.ndarray
+    step: np.ndarray
+    error: np.ndarray
+
+
+class _Parts(NamedTuple):
+    """Scratch: links and multipliers of eight fibers, and their samples; velocity and rotation of a stage; links in
+    the middle and at the end; k₁, k₂, k₃; κ; multipliers; weights of samples; h, β and the estimate."""
+
+    own: Any
+    mine: Any
+    velocities: Any
+    rotations: Any
+    velocity: Any
+    rotation: Any
+    middle: Any
+    new: Any
+    k: Any
+    history: Any
+    tension: Any
+    weights: Any
+    sizes: Any
+
+
+@register_jitable
+def layout(work, beads):
+    """The parts of scratch for fibers of so many beads; what follows is that of the mobility."""
+    rows = 3 * beads
+    own, at = take(work, 0, rows)
+    mine, at = take(work, at, rows - 3)
+    velocities, at = take(work, at, SAMPLES * rows)
+    rotations, at = take(work, at, SAMPLES * rows)
+    velocity, at = take(work, at, rows)
+    rotation, at = take(work, at, rows)
+    middle, at = take(work, at, rows)
+    new, at = take(work, at, rows)
+    k, at = take(work, at, 3 * rows)
+    history, at = take(work, at, rows)
+    tension, at = take(work, at, rows - 3)
+    weights, at = take(work, at, SAMPLES)
+    sizes, at = take(work, at, 3)
+    parts = _Parts(
+        own, mine, velocities, rotations, velocity, rotation, middle, new, k, history, tension, weights, sizes
+    )
+    return parts, at
+
+
+def scratch_rows(mobility: str, beads: int) -> int:
     """Scratch rows per thread for fibers of so many beads."""
-    return 51 * beads + 8 + work_rows(mobility, beads, implicit=True)
+    return rows_of(layout, beads) + work_rows(mobility, beads, implicit=True)
 
 
-@njit(forceinline=True)
+@part
 def _gather(blocks, members, whole, out):
     """The lanes of eight fibers: their block itself, or, if they are of several blocks, copied into out."""
     if whole:
@@ -55,18 +108,18 @@ def _gather(blocks, members, whole, out):
     return out
 
 
-@njit(forceinline=True)
+@inlined
 def _gather_samples(samples, members, whole, out):
     """The lanes of eight fibers in each of SAMPLES samples."""
     rows = samples[0].shape[1]
     return (
-        _gather(samples[0], members, whole, out[:rows]),
-        _gather(samples[1], members, whole, out[rows : 2 * rows]),
-        _gather(samples[2], members, whole, out[2 * rows : 3 * rows]),
+        _gather(samples[0], members, whole, take(out, 0, rows)[0]),
+        _gather(samples[1], members, whole, take(out, rows, rows)[0]),
+        _gather(samples[2], members, whole, take(out, 2 * rows, rows)[0]),
     )
 
 
-@njit
+@part
 def _lagrange(times, count, time, out, lane):
     """Weights of the values at times[:count] in their polynomial at one time, into out[:, lane]."""
     for j in range(SAMPLES):
@@ -77,7 +130,7 @@ def _lagrange(times, count, time, out, lane):
         out[j, lane] = weight
 
 
-@njit(forceinline=True)
+@inlined
 def _blend(samples, weights, out):
     """Ambient field at each lane's own time, from its samples, one after the other in rows."""
     w0, w1, w2 = load(weights, 0), load(weights, 1), load(weights, 2)
@@ -86,105 +139,100 @@ def _blend(samples, weights, out):
         store(out, row, w0 * load(s0, row) + w1 * load(s1, row) + w2 * load(s2, row))
 
 
-@njit(parallel=True, cache=True)
-def attempt(
-    mobility, members, source, lagged, velocity, rotation, times, beta, radius, law, tolerance,
-    scratch, trial, out, out_lagged, elapsed, step, error,
-):  # fmt: skip
+@woven
+def _attempt(stage, share, shares, material, members, samples, tolerance, before, after, pace, scratch):
     """One step of its own size for every fiber in members, accepted where the error estimate allows.
 
-    source → out (B, 3N, LANES), lagged → out_lagged (B, 3(N−1), LANES): links and multipliers; velocity,
-    rotation: SAMPLES samples each, the first len(times) of them valid at times, counted from the start of
-    the flow step. Per fiber: trial, the step to try; elapsed, step, error: time reached, suggested next
-    step, and error estimate, updated.
+    material: Material; samples: Samples, times counted from the start of the flow step; before, after: Ends, of which
+    after is written; pace: Pace, of which all but trial is updated; scratch (threads, rows, LANES).
     """
-    rows = source.shape[1]
+    law, radius, beta = material
+    out, out_lagged, times = after.links, after.multipliers, samples.times
+    trial, elapsed, step, error = pace
+    rows = out.shape[1]
     links = rows // 3 - 1
-    threads = scratch.shape[0]
-    groups = (len(members) + LANES - 1) // LANES
-    for thread in prange(threads):
-        work = scratch[thread]
-        own, mine = work[:rows], work[rows : 2 * rows]
-        u, spin = work[2 * rows : 3 * rows], work[3 * rows : 4 * rows]
-        middle, new = work[4 * rows : 5 * rows], work[5 * rows : 6 * rows]
-        k1, k2, k3 = work[6 * rows : 7 * rows], work[7 * rows : 8 * rows], work[8 * rows : 9 * rows]
-        history, tension = work[9 * rows : 10 * rows], work[10 * rows : 11 * rows]
-        weights, sizes = work[17 * rows : 17 * rows + 3], work[17 * rows + 3 : 17 * rows + 8]
-        rest = work[17 * rows + 8 :]
-        eight = np.empty(LANES, np.int64)
-        for group in range(thread, groups, threads):
-            whole = True
+    parts, used = layout(scratch[share], links + 1)
+    own, mine, velocities, rotations, velocity, rotation, middle, new, k, history, tension, weights, sizes = (
+        parts
+    )
+    work, _ = take(scratch[share], used, scratch.shape[1] - used)
+    k1, _ = take(k, 0, rows)
+    k2, _ = take(k, rows, rows)
+    k3, _ = take(k, 2 * rows, rows)
+    eight = np.empty(LANES, np.int64)
+    for group in range(share, (len(members) + LANES - 1) // LANES, shares):
+        whole = True
+        for lane in range(LANES):
+            eight[lane] = members[min(group * LANES + lane, len(members) - 1)]
+            whole = whole and eight[lane] % LANES == lane and eight[lane] - lane == eight[0]
+            sizes[0, lane] = trial[eight[lane]]
+            sizes[1, lane] = beta[eight[lane] // LANES, eight[lane] % LANES]
+        now = _gather(before.links, eight, whole, own)
+        lag = _gather(before.multipliers, eight, whole, mine)
+        flow = _gather_samples(samples.velocity, eight, whole, velocities)
+        spins = _gather_samples(samples.rotation, eight, whole, rotations)
+        h = load(sizes, 0)
+        sigma = (0.5 * D / radius) * h
+        stiff = smaller(load(sizes, 1), RIGID / sigma)
+        at, lagged = now, lag
+        for s in range(3):
             for lane in range(LANES):
-                eight[lane] = members[min(group * LANES + lane, len(members) - 1)]
-                whole = whole and eight[lane] % LANES == lane and eight[lane] - lane == eight[0]
-                sizes[0, lane] = trial[eight[lane]]
-                sizes[1, lane] = beta[eight[lane] // LANES, eight[lane] % LANES]
-            now = _gather(source, eight, whole, own)
-            lag = _gather(lagged, eight, whole, mine)
-            flow = _gather_samples(velocity, eight, whole, work[11 * rows : 14 * rows])
-            spins = _gather_samples(rotation, eight, whole, work[14 * rows : 17 * rows])
-            h = load(sizes, 0)
-            sigma = (0.5 * D / radius) * h
-            stiff = smaller(load(sizes, 1), RIGID / sigma)
-            for s in range(3):
-                for lane in range(LANES):
-                    at = elapsed[eight[lane]] + FLOW_TIMES[s] * sizes[0, lane]
-                    _lagrange(times, len(times), at, weights, lane)
-                _blend(flow, weights, u)
-                _blend(spins, weights, spin)
+                time = elapsed[eight[lane]] + FLOW_TIMES[s] * sizes[0, lane]
+                _lagrange(times, len(times), time, weights, lane)
+            _blend(flow, weights, velocity)
+            _blend(spins, weights, rotation)
+            for row in range(rows):
                 if s == 0:
-                    for row in range(rows):
-                        store(history, row, splat(0.0))
-                    stage(mobility, now, u, spin, history, lag, sigma, stiff, radius, law, rest, tension, k1)
-                    turn_links(now, k1, 0.5 * h, middle)
+                    store(history, row, splat(0.0))
                 elif s == 1:
-                    for row in range(rows):
-                        store(history, row, -load(k1, row))
-                    stage(
-                        mobility,
-                        middle,
-                        u,
-                        spin,
-                        history,
-                        tension,
-                        sigma,
-                        stiff,
-                        radius,
-                        law,
-                        rest,
-                        tension,
-                        k2,
-                    )
-                    turn_links(now, k2, h, new)
+                    store(history, row, -load(k1, row))
                 else:
-                    for row in range(rows):
-                        store(history, row, (E32 - 2.0) * load(k1, row) - E32 * load(k2, row))
-                    stage(
-                        mobility, new, u, spin, history, tension, sigma, stiff, radius, law, rest, tension, k3
-                    )
-            total = splat(0.0)
-            for i in range(links):
-                gap = add_scaled(add(load3(k1, i), load3(k3, i)), -2.0, load3(k2, i))
-                total = total + dot(gap, gap)
-            store(sizes, 2, (1.0 / 6.0) * h * sqrt((1.0 / links) * total))
-            for lane in range(LANES):
-                fiber, estimate, size = eight[lane], sizes[2, lane], sizes[0, lane]
-                b, place = fiber // LANES, fiber % LANES
-                if group * LANES + lane >= len(members):
-                    continue
-                error[fiber] = estimate
-                factor = SHRINK
-                if estimate < np.inf:
-                    factor = max(SHRINK, min(GROW, SAFETY * (tolerance / max(estimate, 1e-300)) ** (1 / 3)))
-                step[fiber] = size * factor
-                if estimate <= tolerance:
-                    elapsed[fiber] += size
-                    for row in range(rows):
-                        out[b, row, place] = new[row, lane]
-                    for row in range(3 * links):
-                        out_lagged[b, row, place] = tension[row, lane]
-                else:
-                    for row in range(rows):
-                        out[b, row, place] = now[row, lane]
-                    for row in range(3 * links):
-                        out_lagged[b, row, place] = lag[row, lane]
+                    store(history, row, (E32 - 2.0) * load(k1, row) - E32 * load(k2, row))
+            rates, _ = take(k, s * rows, rows)
+            stage(
+                Chain(at, stiff, radius, law),
+                Flow(velocity, rotation),
+                Ahead(history, lagged, sigma),
+                work,
+                Motion(rates, tension),
+            )
+            lagged = tension
+            if s < 2:
+                at = middle if s == 0 else new
+                turn_links(now, rates, (0.5 if s == 0 else 1.0) * h, at)
+        total = splat(0.0)
+        for i in range(links):
+            gap = add_scaled(add(load3(k1, i), load3(k3, i)), -2.0, load3(k2, i))
+            total = total + dot(gap, gap)
+        store(sizes, 2, (1.0 / 6.0) * h * sqrt((1.0 / links) * total))
+        for lane in range(min(LANES, len(members) - group * LANES)):
+            fiber, estimate, size = eight[lane], sizes[2, lane], sizes[0, lane]
+            b, place = fiber // LANES, fiber % LANES
+            error[fiber] = estimate
+            factor = SHRINK
+            if estimate < np.inf:
+                factor = max(SHRINK, min(GROW, SAFETY * (tolerance / max(estimate, 1e-300)) ** (1 / 3)))
+            step[fiber] = size * factor
+            accepted = estimate <= tolerance
+            if accepted:
+                elapsed[fiber] += size
+            source, contact = (new, tension) if accepted else (now, lag)
+            for row in range(rows):
+                out[b, row, place] = source[row, lane]
+            for row in range(3 * links):
+                out_lagged[b, row, place] = contact[row, lane]
+
+
+@kernel
+def _free_drain(share, shares, material, members, samples, tolerance, before, after, pace, scratch):
+    drain = implicit_drain.stage
+    _attempt(drain, share, shares, material, members, samples, tolerance, before, after, pace, scratch)
+
+
+@kernel
+def _rpy(share, shares, material, members, samples, tolerance, before, after, pace, scratch):
+    hydro = rpy.stage
+    _attempt(hydro, share, shares, material, members, samples, tolerance, before, after, pace, scratch)
+
+
+ATTEMPT = {"freeDrain": _free_drain, "rpy": _rpy}

@@ -12,33 +12,29 @@ per joint for the discrete rod), and the matrix has seven block diagonals. It is
 elimination, O(N).
 """
 
-from numba import njit
+from typing import Any, NamedTuple
 
-from .bending import FOLD
+from numba.extending import register_jitable
+
+from ..compiled import inlined, part
+from .bending import rod_factor
+from .blocks import take
 from .layout import difference, mean_vector
-from .matrix3 import (
-    apply,
-    identity_plus,
-    inverse,
-    load9,
-    minus_apply,
-    minus_product,
-    plus_outer,
-    product,
-    store9,
-)
+from .matrix3 import apply, identity_plus, inverse, minus_apply, minus_product, plus_outer, product
 from .simd import (
     add,
     add_scaled,
+    arithmetic,
     cross,
     dot,
-    larger,
     load,
     load3,
+    load9,
     scale,
     splat,
     store,
     store3,
+    store9,
     subtract,
     zero3,
 )
@@ -46,12 +42,36 @@ from .simd import (
 PAD = 2  # zero vectors before and after the links of a padded array: no special rows at the ends
 
 
-def work_rows(beads: int) -> int:
-    """Rows of scratch that stage needs for fibers of so many beads."""
-    return 45 * beads + 120
+class _Parts(NamedTuple):
+    """Scratch: padded vectors of links, gaps, multipliers, moments; scalars of joints; the eliminated matrix."""
+
+    e: Any
+    g: Any
+    tension: Any
+    moments: Any
+    factor: Any
+    slope: Any
+    upper: Any
+    solution: Any
 
 
-@njit(forceinline=True)
+@register_jitable
+def layout(work, beads):
+    """The parts of scratch for fibers of so many beads."""
+    links = beads - 1
+    padded = links + 2 * PAD
+    e, at = take(work, 0, 3 * padded)
+    g, at = take(work, at, 3 * padded)
+    tension, at = take(work, at, 3 * padded)
+    moments, at = take(work, at, 3 * padded)
+    factor, at = take(work, at, padded)
+    slope, at = take(work, at, padded)
+    upper, at = take(work, at, 27 * (links + 3))
+    solution, at = take(work, at, 3 * (links + 6))
+    return _Parts(e, g, tension, moments, factor, slope, upper, solution), at
+
+
+@inlined
 def _joints(e, links, law, factor, slope, moments):
     """f, df/dcosθ and moments of the joints 0 … links + 1 of padded links e (joint j lies before link j)."""
     for j in range(links + 4):
@@ -62,25 +82,25 @@ def _joints(e, links, law, factor, slope, moments):
         t, u = load3(e, j + PAD - 1), load3(e, j + PAD)
         f = splat(1.0)
         if law == 1:
-            f = 2.0 / larger(1.0 + dot(t, u), splat(FOLD))
+            f = rod_factor(t, u)
             store(slope, j + PAD, -0.5 * f * f)
         store(factor, j + PAD, f)
         store3(moments, j + PAD, scale(f, cross(t, u)))
 
 
-@njit(forceinline=True)
+@arithmetic
 def _second_difference(left, here, right):
     """left − 2 here + right of a scalar of lanes."""
     return left - 2.0 * here + right
 
 
-@njit(forceinline=True)
+@arithmetic
 def _second_difference3(left, here, right):
     """left − 2 here + right of a vector."""
     return add_scaled(add(left, right), -2.0, here)
 
 
-@njit(forceinline=True)
+@arithmetic
 def _outer_joint(row, y, t, u):
     """Add y (D-combination of t, u)ᵀ to four blocks of a row: derivative of a joint's f."""
     a, b, c, d = row
@@ -92,27 +112,15 @@ def _outer_joint(row, y, t, u):
     )
 
 
-@njit
-def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, work, multipliers, rates):
-    """Rates (3N, LANES) of a stage at the links of state, and its multipliers (3(N−1), LANES).
-
-    history (3N, LANES): κ, rotation rates added to the unknown ones in δe; lagged: the multipliers in E;
-    sigma: h d/2a per lane; work: scratch of work_rows(N) rows.
-    """
+@part
+def stage(chain, flow, ahead, work, motion):
+    """Motion of a Chain in a Flow with torques Ahead; work: scratch."""
+    state, beta, radius, law = chain
+    velocity, rotation = flow
+    history, lagged, sigma = ahead
+    rates, multipliers = motion
     links = rates.shape[0] // 3 - 1
-    size = 3 * (links + 2 * PAD)
-    e, g, tension, moments = (
-        work[:size],
-        work[size : 2 * size],
-        work[2 * size : 3 * size],
-        work[3 * size : 4 * size],
-    )
-    at = 4 * size
-    factor, slope = work[at : at + size // 3], work[at + size // 3 : at + 2 * size // 3]
-    at += size
-    upper = work[at : at + 27 * (links + 3)]
-    at += 27 * (links + 3)
-    solution = work[at : at + 3 * (links + 6)]
+    (e, g, tension, moments, factor, slope, upper, solution), _ = layout(work, links + 1)
     for k in range(PAD):
         for end in (k, links + PAD + k):
             store3(e, end, zero3())

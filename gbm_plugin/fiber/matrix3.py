@@ -1,11 +1,9 @@
 """3×3 matrices of lanes: tuples of nine, row by row; symmetric ones of six (xx, xy, xz, yy, yz, zz)."""
 
-from numba import njit
-
-from .simd import dot, load, store
+from .simd import arithmetic, dot
 
 
-@njit(forceinline=True)
+@arithmetic
 def identity_plus(alpha, p, e):
     """α I + p eᵀ."""
     return (
@@ -21,7 +19,7 @@ def identity_plus(alpha, p, e):
     )
 
 
-@njit(forceinline=True)
+@arithmetic
 def plus_outer(m, p, e):
     """m + p eᵀ."""
     return (
@@ -37,7 +35,7 @@ def plus_outer(m, p, e):
     )
 
 
-@njit(forceinline=True)
+@arithmetic
 def product(a, b):
     """a b."""
     return (
@@ -53,7 +51,7 @@ def product(a, b):
     )
 
 
-@njit(forceinline=True)
+@arithmetic
 def minus_product(m, a, b):
     """m − a b."""
     return (
@@ -69,7 +67,7 @@ def minus_product(m, a, b):
     )
 
 
-@njit(forceinline=True)
+@arithmetic
 def minus_apply(v, a, x):
     """v − a x."""
     return (
@@ -79,13 +77,13 @@ def minus_apply(v, a, x):
     )
 
 
-@njit(forceinline=True)
+@arithmetic
 def apply(a, x):
     """a x."""
     return dot(a[0:3], x), dot(a[3:6], x), dot(a[6:9], x)
 
 
-@njit(forceinline=True)
+@arithmetic
 def inverse(m):
     """Inverse by cofactors."""
     c0 = m[4] * m[8] - m[5] * m[7]
@@ -105,39 +103,7 @@ def inverse(m):
     )
 
 
-@njit(forceinline=True)
-def load9(array, i):
-    """Matrix i of an array of matrices, rows 9 i … 9 i + 8."""
-    r = 9 * i
-    return (
-        load(array, r),
-        load(array, r + 1),
-        load(array, r + 2),
-        load(array, r + 3),
-        load(array, r + 4),
-        load(array, r + 5),
-        load(array, r + 6),
-        load(array, r + 7),
-        load(array, r + 8),
-    )
-
-
-@njit(forceinline=True)
-def store9(array, i, m):
-    """Write matrix i of an array of matrices."""
-    r = 9 * i
-    store(array, r, m[0])
-    store(array, r + 1, m[1])
-    store(array, r + 2, m[2])
-    store(array, r + 3, m[3])
-    store(array, r + 4, m[4])
-    store(array, r + 5, m[5])
-    store(array, r + 6, m[6])
-    store(array, r + 7, m[7])
-    store(array, r + 8, m[8])
-
-
-@njit(forceinline=True)
+@arithmetic
 def inverse_symmetric(s):
     """Inverse of a symmetric matrix."""
     xx = s[3] * s[5] - s[4] * s[4]
@@ -150,25 +116,11 @@ def inverse_symmetric(s):
     return r * xx, r * xy, r * xz, r * yy, r * yz, r * zz
 
 
-@njit(forceinline=True)
+@arithmetic
 def apply_symmetric(s, v):
     """Symmetric matrix times vector."""
     return (
         s[0] * v[0] + s[1] * v[1] + s[2] * v[2],
         s[1] * v[0] + s[3] * v[1] + s[4] * v[2],
         s[2] * v[0] + s[4] * v[1] + s[5] * v[2],
-    )
-
-
-@njit(forceinline=True)
-def load6(array, i):
-    """Symmetric matrix i of an array of them, rows 6 i … 6 i + 5."""
-    r = 6 * i
-    return (
-        load(array, r),
-        load(array, r + 1),
-        load(array, r + 2),
-        load(array, r + 3),
-        load(array, r + 4),
-        load(array, r + 5),
     )

@@ -3,20 +3,38 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kernel, woven
+from . import free_drain, rpy
 from .bending import CURVATURE_LAWS, velocity_scale
+from .blocks import Chain, Flow, Material, Motion
 from .fibers import Fibers, one_of
 from .layout import pack, unpack
-from .mobility import MOBILITIES, link_rates, work_rows
+from .mobility import MOBILITIES, work_rows
 from .simd import load
 
 
-@njit(cache=True)
-def _evaluate(mobility, state, velocity, rotation, beta, radius, law, work, multipliers, rates):
+@woven
+def _evaluate(link_rates, material, state, velocity, rotation, work, multipliers, rates):
+    law, radius, beta = material
     for b in range(state.shape[0]):
-        stiffness, own = load(beta, b), multipliers[b]
-        link_rates(mobility, state[b], velocity[b], rotation[b], stiffness, radius, law, work, own, rates[b])
+        chain, flow = Chain(state[b], load(beta, b), radius, law), Flow(velocity[b], rotation[b])
+        link_rates(chain, flow, work, Motion(rates[b], multipliers[b]))
+
+
+@kernel
+def _free_drain(material, state, velocity, rotation, work, multipliers, rates):
+    drain = free_drain.link_rates
+    _evaluate(drain, material, state, velocity, rotation, work, multipliers, rates)
+
+
+@kernel
+def _rpy(material, state, velocity, rotation, work, multipliers, rates):
+    hydro = rpy.link_rates
+    _evaluate(hydro, material, state, velocity, rotation, work, multipliers, rates)
+
+
+_EVALUATE = {"freeDrain": _free_drain, "rpy": _rpy}
 
 
 def instant_rates(fibers: Fibers, velocity, rotation, mobility="freeDrain"):
@@ -25,16 +43,20 @@ def instant_rates(fibers: Fibers, velocity, rotation, mobility="freeDrain"):
     velocity, rotation: ambient, at the beads (F, N, 3). The force of link i acts on bead i, its opposite on
     bead i + 1; its part along the link is the tension.
     """
-    kind = MOBILITIES.index(one_of("mobility", mobility, MOBILITIES))
+    evaluate = _EVALUATE[one_of("mobility", mobility, MOBILITIES)]
     state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
     rates, multipliers = np.zeros_like(state), np.zeros((len(state), state.shape[1] - 3, state.shape[2]))
-    beta = pack(velocity_scale(fibers))[:, 0]
-    law = CURVATURE_LAWS.index(fibers.curvature_law)
-    work = np.zeros((work_rows(kind, fibers.beads, implicit=False), state.shape[2]))
+    work = np.zeros((work_rows(mobility, fibers.beads, implicit=False), state.shape[2]))
     shape = (fibers.count, fibers.beads, 3)
-    velocity, rotation = np.broadcast_to(velocity, shape), np.broadcast_to(rotation, shape)
-    _evaluate(kind, state, pack(velocity), pack(rotation), beta, fibers.radius, law, work, multipliers, rates)
+    velocity, rotation = (pack(np.broadcast_to(field, shape)) for field in (velocity, rotation))
+    evaluate(material(fibers), state, velocity, rotation, work, multipliers, rates)
     drag = 6 * np.pi * fibers.viscosity * fibers.radius
     forces = drag * unpack(multipliers, (fibers.count, fibers.beads - 1, 3))
     rates = unpack(rates, shape)
     return rates[:, :-1], rates[:, -1], forces
+
+
+def material(fibers: Fibers) -> Material:
+    """What kernels know of these fibers."""
+    beta = np.ascontiguousarray(pack(velocity_scale(fibers))[:, 0])
+    return Material(CURVATURE_LAWS.index(fibers.curvature_law), float(fibers.radius), beta)

@@ -10,13 +10,18 @@ units of a and n from bead j to bead i,
 All are continuous at contact, and the whole mobility is symmetric positive definite for any positions.
 """
 
-from numba import njit
+from typing import Any, NamedTuple
 
-from .bending import FOLD, moment
+from numba.extending import register_jitable
+
+from ..compiled import inlined, part
+from .bending import moment, rod_factor
+from .blocks import take
 from .layout import difference, mean_vector
 from .simd import (
     add,
     add_scaled,
+    arithmetic,
     cross,
     dot,
     larger,
@@ -35,14 +40,14 @@ from .simd import (
 COEFFICIENTS = 8  # per pair: A, B, q, C, D, n
 
 
-@njit(forceinline=True)
+@arithmetic
 def pair(x):
     """A, B, q, C, D and n of two spheres a distance x apart, in units of a."""
-    square = larger(dot(x, x), splat(1e-24))
+    square = larger(dot(x, x), 1e-24)
     r = sqrt(square)
     i = 1.0 / r
     i3 = i * i * i
-    far, r3 = splat(2.0), r * square
+    far, r3 = 2.0, r * square
     a = select_less(r, far, 1.0 - 9.0 / 32.0 * r, 0.75 * i + 0.5 * i3)
     b = select_less(r, far, 3.0 / 32.0 * r, 0.75 * i - 1.5 * i3)
     q = select_less(r, far, 0.375 * r - 9.0 / 64.0 * square, 0.75 * i * i)
@@ -51,7 +56,7 @@ def pair(x):
     return a, b, q, c, d, scale(i, x)
 
 
-@njit(forceinline=True)
+@inlined
 def _load_pair(pairs, i, j):
     """A, B, q, C, D of beads i ≠ j, and the direction from j to i."""
     high, low = max(i, j), min(i, j)
@@ -61,7 +66,7 @@ def _load_pair(pairs, i, j):
     return load(pairs, p), load(pairs, p + 1), load(pairs, p + 2), load(pairs, p + 3), load(pairs, p + 4), n
 
 
-@njit(forceinline=True)
+@inlined
 def response(pairs, i, j, force, torque):
     """Velocity and spin of bead i from force and torque on bead j."""
     if i == j:
@@ -72,7 +77,7 @@ def response(pairs, i, j, force, torque):
     return add_scaled(velocity, q, cross(torque, n)), add_scaled(spin, q, cross(force, n))
 
 
-@njit(forceinline=True)
+@inlined
 def torque_response(pairs, i, j, torque):
     """Velocity and spin of bead i from a torque on bead j."""
     if i == j:
@@ -81,34 +86,67 @@ def torque_response(pairs, i, j, torque):
     return scale(q, cross(torque, n)), add_scaled(scale(0.75 * c, torque), 0.75 * d * dot(n, torque), n)
 
 
-def work_rows(beads: int, implicit: bool) -> int:
-    """Rows of scratch for the explicit rates or the implicit stage of fibers of so many beads."""
-    n, m = 3 * (beads - 1), 3 * (beads - 2)
-    rows = COEFFICIENTS * beads * (beads - 1) // 2 + n * n + (n + 3) * n + 18 * beads
-    return rows + ((n + 3) * m + m * m + 2 * m + 2 * n + 24 * beads if implicit else 0)
+class _Parts(NamedTuple):
+    """Scratch of rates and stage: pairs, Cholesky factor, response of the gaps; per bead velocity, spin, torque."""
+
+    pairs: Any
+    factor: Any
+    gaps: Any
+    v: Any
+    s: Any
+    torques: Any
 
 
-@njit(forceinline=True)
-def _parts(work, beads):
-    """The scratch shared by both: pairs, Cholesky factor, gap response, velocities, spins, other, rest."""
+class _StageParts(NamedTuple):
+    """More scratch of a stage: response of the gaps to joint moments, the joints' matrix and moments; gaps without
+    bending, gaps ahead, one column; slips and gaps of three columns at once."""
+
+    bending: Any
+    matrix: Any
+    moments: Any
+    free: Any
+    ahead: Any
+    column: Any
+    slips: Any
+    columns: Any
+
+
+@register_jitable
+def layout(work, beads):
+    """The parts of scratch for the rates of fibers of so many beads."""
     n = 3 * (beads - 1)
-    at = COEFFICIENTS * beads * (beads - 1) // 2
-    pairs, factor = work[:at], work[at : at + n * n]
-    at += n * n
-    gaps = work[at : at + (n + 3) * n]
-    at += (n + 3) * n
-    v, s = work[at : at + 3 * beads], work[at + 3 * beads : at + 6 * beads]
-    other = work[at + 6 * beads : at + 18 * beads]
-    return pairs, factor, gaps, v, s, other, work[at + 18 * beads :]
+    pairs, at = take(work, 0, COEFFICIENTS * beads * (beads - 1) // 2)
+    factor, at = take(work, at, n * n)
+    gaps, at = take(work, at, (n + 3) * n)
+    v, at = take(work, at, n + 3)
+    s, at = take(work, at, n + 3)
+    torques, at = take(work, at, n + 3)
+    return _Parts(pairs, factor, gaps, v, s, torques), at
 
 
-@njit(forceinline=True)
+@register_jitable
+def stage_layout(work, beads):
+    """The parts of scratch for a stage of fibers of so many beads."""
+    n, m = 3 * (beads - 1), 3 * (beads - 2)
+    parts, at = layout(work, beads)
+    bending, at = take(work, at, (n + 3) * m)
+    matrix, at = take(work, at, m * m)
+    moments, at = take(work, at, m)
+    free, at = take(work, at, n + 3)
+    ahead, at = take(work, at, n)
+    column, at = take(work, at, n + 3)
+    slips, at = take(work, at, 3 * n)
+    columns, at = take(work, at, 3 * (n + 3))
+    return (parts, _StageParts(bending, matrix, moments, free, ahead, column, slips, columns)), at
+
+
+@inlined
 def _slip(state, v, s, i):
     """v_i − v_(i+1) − e_i × (s_i + s_(i+1)): what rolling contact forbids."""
     return subtract(scale(-1.0, difference(v, i)), cross(load3(state, i), add(load3(s, i), load3(s, i + 1))))
 
 
-@njit(forceinline=True)
+@inlined
 def _dot_rows(a, first_a, stride, b, first_b, count):
     """Σ a[first_a + k stride] b[first_b + k], in four sums so that they do not wait for each other."""
     s0, s1, s2, s3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
@@ -124,8 +162,8 @@ def _dot_rows(a, first_a, stride, b, first_b, count):
     return (s0 + s1) + (s2 + s3)
 
 
-@njit
-def assemble(state, radius, pairs, factor, gaps, v, s):
+@part
+def assemble(state, pairs, factor, gaps, v, s):
     """Cholesky factor (lower, its diagonal inverted) of the constraint matrix, and gaps from multipliers.
 
     Column 3k + c of gaps (3N, 3(N−1)) holds, for a unit multiplier of link k, all v_(i+1) − v_i and the
@@ -181,7 +219,7 @@ def assemble(state, radius, pairs, factor, gaps, v, s):
             store(factor, i * n + j, rest * inverse)
 
 
-@njit
+@part
 def roll(state, factor, gaps, v, s, multipliers, out):
     """Multipliers that stop the slip of velocities v and spins s; out: resulting gaps and mean velocity."""
     links = state.shape[0] // 3 - 1
@@ -202,7 +240,7 @@ def roll(state, factor, gaps, v, s, multipliers, out):
         store(out, row, load(out, row) + _dot_rows(gaps, row * n, 1, multipliers, 0, n))
 
 
-@njit(forceinline=True)
+@inlined
 def _dot_columns(a, first, stride, x, begin, count):
     """Σ a[first + k stride] x[begin + k] for three columns at once, row by row in x."""
     even, odd = zero3(), zero3()
@@ -216,7 +254,7 @@ def _dot_columns(a, first, stride, x, begin, count):
     return add(even, odd)
 
 
-@njit
+@part
 def _roll_columns(factor, gaps, n, x, out):
     """As roll for three columns at once: x, their slips, is overwritten; out, their gaps, is completed."""
     for i in range(n):
@@ -230,7 +268,7 @@ def _roll_columns(factor, gaps, n, x, out):
         store3(out, row, subtract(load3(out, row), _dot_columns(gaps, row * n, 1, x, 0, n)))
 
 
-@njit
+@part
 def torques_to_motion(pairs, torques, v, s):
     """Add to v and s what torques on all beads cause."""
     beads = v.shape[0] // 3
@@ -243,15 +281,16 @@ def torques_to_motion(pairs, torques, v, s):
         store3(s, i, spin)
 
 
-@njit
-def ambient(velocity, rotation, radius, v, s):
+@part
+def ambient(flow, radius, v, s):
     """v, s = the ambient velocity and a × rotation."""
+    velocity, rotation = flow
     for i in range(v.shape[0] // 3):
         store3(v, i, load3(velocity, i))
         store3(s, i, scale(radius, load3(rotation, i)))
 
 
-@njit(forceinline=True)
+@inlined
 def _joint_moment(state, j, law):
     """Moment at bead j, none at the ends."""
     if j < 1 or j > state.shape[0] // 3 - 2:
@@ -259,14 +298,15 @@ def _joint_moment(state, j, law):
     return moment(load3(state, j - 1), load3(state, j), law)
 
 
-@njit
-def link_rates(state, velocity, rotation, beta, radius, law, work, multipliers, rates):
+@part
+def link_rates(chain, flow, work, motion):
     """As free_drain.link_rates, with this mobility."""
+    state, beta, radius, law = chain
+    rates, multipliers = motion
     links = state.shape[0] // 3 - 1
-    pairs, factor, gaps, v, s, other, _ = _parts(work, links + 1)
-    assemble(state, radius, pairs, factor, gaps, v, s)
-    ambient(velocity, rotation, radius, v, s)
-    torques = other[: 3 * links + 3]
+    (pairs, factor, gaps, v, s, torques), _ = layout(work, links + 1)
+    assemble(state, pairs, factor, gaps, v, s)
+    ambient(flow, radius, v, s)
     for i in range(links + 1):
         torque = subtract(_joint_moment(state, i + 1, law), _joint_moment(state, i - 1, law))
         store3(torques, i, scale(4.0 / 3.0 * beta, torque))
@@ -281,37 +321,35 @@ def link_rates(state, velocity, rotation, beta, radius, law, work, multipliers, 
     return tension
 
 
-@njit(forceinline=True)
+@inlined
 def _moment_change(state, g, j, law):
     """Change of the moment at bead j (and the moment) when the links around it change by g."""
     t, u = load3(state, j - 1), load3(state, j)
     dt, du = load3(g, j - 1), load3(g, j)
     bend, change = cross(t, u), add(cross(dt, u), cross(t, du))
     if law == 1:
-        f = 2.0 / larger(1.0 + dot(t, u), splat(FOLD))
+        f = rod_factor(t, u)
         change = add_scaled(scale(f, change), -0.5 * f * f * (dot(dt, u) + dot(t, du)), bend)
         bend = scale(f, bend)
     return bend, change
 
 
-@njit
-def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, work, multipliers, rates):
+@part
+def stage(chain, flow, ahead, work, motion):
     """As implicit_drain.stage, with this mobility: the unknowns are the joint moments βM at links e + δe.
 
     With W their response in the gaps 2a de/dt, and C the derivative of M, (I − βσ C W) βM = β (M + σ C g),
     g the gaps without bending plus 2a κ × e: compliant and rigid joints alike are well conditioned.
     """
+    state, beta, radius, law = chain
+    history, _, sigma = ahead
+    rates, multipliers = motion
     links = state.shape[0] // 3 - 1
     n, m = 3 * links, 3 * (links - 1)
-    pairs, factor, gaps, v, s, other, rest = _parts(work, links + 1)
-    bending, matrix = rest[: (n + 3) * m], rest[(n + 3) * m : (n + 3 + m) * m]
-    at = (n + 3 + m) * m
-    moments = rest[at : at + m]
-    at += m
-    free, g, gap_column = rest[at : at + n + 3], rest[at + n + 3 : at + 2 * n + 6], other[: n + 3]
-    at += 2 * n + 6
-    slips, columns = rest[at : at + 3 * n], rest[at + 3 * n : at + 6 * n + 9]
-    assemble(state, radius, pairs, factor, gaps, v, s)
+    (common, own), _ = stage_layout(work, links + 1)
+    pairs, factor, gaps, v, s, _ = common
+    bending, matrix, moments, free, g, gap_column, slips, columns = own
+    assemble(state, pairs, factor, gaps, v, s)
     one, none = splat(1.0), splat(0.0)
     for j in range(1, links):
         for c in range(3):
@@ -344,7 +382,7 @@ def stage(state, velocity, rotation, history, lagged, sigma, beta, radius, law, 
                     store(
                         matrix, row * m + column, (one if row == column else none) - beta * sigma * change[d]
                     )
-    ambient(velocity, rotation, radius, v, s)
+    ambient(flow, radius, v, s)
     roll(state, factor, gaps, v, s, multipliers, free)
     for i in range(links):
         turned = cross(load3(history, i), load3(state, i))

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import get_num_threads
 
 from . import ab3, implicit
 from .ambient import SAMPLES, Ambient, lagrange_weights
-from .bending import CURVATURE_LAWS, velocity_scale
+from .blocks import Samples
 from .contact import repulsion_velocity
 from .fibers import Fibers, one_of, positive
-from .layout import COPYING, bead_positions, pack, threads_for, unpack
+from .layout import bead_positions, pack, unpack
 from .mobility import MOBILITIES
+from .rates import material
 from .simd import LANES
 from .strain import with_strain
+from .threads import COPYING, available, in_shares
 
 INTEGRATORS = ("ab3", "implicit", "auto")
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
@@ -56,7 +57,6 @@ class Stepper:
         self._beads = fibers.count * fibers.beads
         self.integrator = one_of("integrator", integrator, INTEGRATORS)
         self.mobility = one_of("mobility", mobility, MOBILITIES)
-        self._mobility = MOBILITIES.index(mobility)
         if strain_coupling and mobility == "freeDrain":
             raise ValueError("strain_coupling with mobility freeDrain has no effect; it needs rpy")
         self.need = "gradient" if strain_coupling else "rotation"
@@ -66,8 +66,7 @@ class Stepper:
         self.time = float(time)
         self.provisional = False
         self._ambient = Ambient(fibers.count, fibers.beads)
-        self._beta = pack(velocity_scale(fibers))[:, 0]
-        self._law = CURVATURE_LAWS.index(fibers.curvature_law)
+        self._material = material(fibers)
         blocks, rows = -(-fibers.count // LANES), 3 * fibers.beads
         # before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
         self._last = np.zeros((blocks, rows, LANES))
@@ -84,7 +83,7 @@ class Stepper:
         self._last_tension = 0.0
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
-        self._scratch = np.zeros((get_num_threads(), self._scratch_rows(), LANES))
+        self._scratch = np.zeros((available(), self._scratch_rows(), LANES))
         self._counts = {
             "steps": 0,
             "ab3_steps": 0,
@@ -95,17 +94,14 @@ class Stepper:
         }
 
     def _scratch_rows(self) -> int:
-        explicit = ab3.scratch_rows(self._mobility, self.fibers.beads)
-        if self.integrator == "ab3":
-            return explicit
-        return max(explicit, implicit.scratch_rows(self._mobility, self.fibers.beads))
+        steps = {"ab3": (ab3,), "implicit": (implicit,), "auto": (ab3, implicit)}[self.integrator]
+        return max(step.scratch_rows(self.mobility, self.fibers.beads) for step in steps)
 
     @property
     def positions(self) -> np.ndarray:
         """(F, N, 3) bead centres now, unwrapped."""
         positions = np.empty((self.fibers.count, self.fibers.beads, 3))
-        with threads_for(COPYING * self._beads):
-            bead_positions(self._state, 2 * self.fibers.radius, positions)
+        in_shares(bead_positions, COPYING * self._beads, self._state, 2 * self.fibers.radius, positions)
         return positions
 
     @property
@@ -128,8 +124,7 @@ class Stepper:
         if self.repulsion:
             push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
             velocity = velocity + push
-        with threads_for(COPYING * self._beads):
-            self._ambient.observe(time, velocity, extra)
+        self._ambient.observe(time, velocity, extra)
 
     def _field(self, name, values, tail) -> np.ndarray:
         """Sampled values, if they are (F, N, *tail) and finite."""
@@ -162,16 +157,14 @@ class Stepper:
         self._last_ages, self._last_tension = self._ages, self._tension
         self._last_step = self._step.copy()
         self._counts["steps"] += 1
-        with threads_for(self._beads):
-            self._run()
+        self._run()
 
     def correct(self) -> None:
         """Redo the last step with the sample at its end included."""
         if not self.provisional or self._ambient.times[-1] != self.time:
             raise ValueError("correct() follows a provisional advance() and the observe() at its end")
         self.provisional = False
-        with threads_for(self._beads):
-            self._run()
+        self._run()
 
     def _run(self) -> None:
         """The last step, from its kept start, with the samples that there are."""
@@ -211,18 +204,25 @@ class Stepper:
         """All fibers by ab3 in count sub-steps; returns the error estimates (F,)."""
         fibers, h = self.fibers, self._length / count
         times, (velocity, rotation) = self._ambient.polynomial(self._start)
-        weights = np.zeros((count, ab3.STAGES, SAMPLES))
+        flow = np.zeros((count, ab3.STAGES, SAMPLES))
         for s in range(count):
             for stage in range(ab3.STAGES):
-                at = (s + stage / ab3.STAGES) * h
-                weights[s, stage, : len(times)] = lagrange_weights(times, at)
+                flow[s, stage, : len(times)] = lagrange_weights(times, (s + stage / ab3.STAGES) * h)
         error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
         new, old = self._spare
-        ab3.advance(
-            self._mobility, self._last, (self._last_rates[0], new), (self._last_rates[1], old),
-            velocity, rotation, weights, ab3.plan(self._last_ages, h, count),
-            self._beta, fibers.radius, self._law, self._scratch, self._state, error, tension,
-        )  # fmt: skip
+        in_shares(
+            ab3.ADVANCE[self.mobility],
+            self._beads,
+            self._material,
+            Samples(velocity, rotation, times),
+            ab3.plan(self._last_ages, h, flow),
+            ab3.History(self._last, *self._last_rates),
+            ab3.History(self._state, new, old),
+            self._scratch,
+            error,
+            tension,
+            most=len(self._scratch),
+        )
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
         self._tension = tension.reshape(-1)[: fibers.count].max()
@@ -236,18 +236,29 @@ class Stepper:
         """The given fibers by linearly implicit steps, each with as many as its error estimate asks for."""
         fibers, end = self.fibers, self._length
         times, (velocity, rotation) = self._ambient.polynomial(self._start)
+        samples = Samples(velocity, rotation, times)
         elapsed, error, trial = np.zeros(fibers.count), np.zeros(fibers.count), np.zeros(fibers.count)
-        source, lagged = self._last, self._last_multipliers
+        pace = implicit.Pace(trial, elapsed, self._step, error)
+        before = implicit.Ends(self._last, self._last_multipliers)
+        after = implicit.Ends(self._state, self._multipliers)
         attempts, refined = 0, np.zeros(0, dtype=int)
         while len(members):
             remaining = end - elapsed[members]
             trial[members] = remaining / np.ceil(np.maximum(remaining / self._step[members] * (1 - 1e-12), 1))
-            implicit.attempt(
-                self._mobility, members, source, lagged, velocity, rotation, times,
-                self._beta, fibers.radius, self._law, self.local_tolerance, self._scratch, trial,
-                self._state, self._multipliers, elapsed, self._step, error,
-            )  # fmt: skip
-            source, lagged = self._state, self._multipliers
+            work = (
+                self._material,
+                members,
+                samples,
+                self.local_tolerance,
+                before,
+                after,
+                pace,
+                self._scratch,
+            )
+            in_shares(
+                implicit.ATTEMPT[self.mobility], len(members) * fibers.beads, *work, most=len(self._scratch)
+            )
+            before = after
             attempts += 1
             self._count(0, error[members][error[members] <= self.local_tolerance])
             if (trial[members] < SMALLEST_STEP * end).any():

@@ -10,18 +10,24 @@ lengths in a,
 """
 
 import numpy as np
-from numba import njit, prange
+
+from ..compiled import kernel, only_read
+from .threads import in_shares
 
 
-@njit(parallel=True, cache=True)
-def _disturb(positions, strain, radius, velocity, rotation):
+@kernel
+def _disturb(share, shares, positions, strain, radius, velocity, rotation):
     count, beads = positions.shape[:2]
-    for f in prange(count):
+    for f in range(share, count, shares):
         for i in range(beads):
             for j in range(beads):
                 if i == j:
                     continue
-                x = (positions[f, i] - positions[f, j]) / radius
+                x = (
+                    (positions[f, i, 0] - positions[f, j, 0]) / radius,
+                    (positions[f, i, 1] - positions[f, j, 1]) / radius,
+                    (positions[f, i, 2] - positions[f, j, 2]) / radius,
+                )
                 square = x[0] ** 2 + x[1] ** 2 + x[2] ** 2
                 r = np.sqrt(square)
                 if r > 2.0:
@@ -53,7 +59,7 @@ def with_strain(positions, velocity, gradient, radius):
     """
     transpose = np.swapaxes(gradient, -1, -2)
     rotation = 0.5 * (transpose - gradient)[..., [1, 2, 0], [2, 0, 1]]
-    strain = 0.5 * (gradient + transpose)
-    velocity = np.array(velocity, dtype=float)
-    _disturb(positions, strain, radius, velocity, rotation)
+    strain = only_read(0.5 * (gradient + transpose))
+    velocity, rotation = (np.array(field, dtype=float, order="C") for field in (velocity, rotation))
+    in_shares(_disturb, velocity.size / 3, only_read(positions), strain, radius, velocity, rotation)
     return velocity, rotation

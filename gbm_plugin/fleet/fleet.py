@@ -15,7 +15,7 @@ from ..case.layout import STATE_FILE, fiber_state
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
 from ..errors import CaseError, PredictionError, StateError
-from ..fiber import Fibers, Stepper, merged_states
+from ..fiber import Fibers, Stepper, merged_states, prepare
 from ..files import replaced
 from ..flow import NEEDS
 from ..statistics.fibers import end_to_end_squared_ratio
@@ -24,6 +24,13 @@ log = logging.getLogger(__name__)
 
 # prediction gap over the rms velocity at the beads: worth a word, and too much to go on with
 GAP_WARNING, GAP_LIMIT = 0.1, 1.0
+
+
+def prepare_kernels(families: Sequence[Family]) -> None:
+    """All that these families will call is compiled when this returns: in a step somebody waits."""
+    models = (f.model for f in families)
+    for words in {(m.integrator, m.mobility, m.strain_coupling, m.repulsion) for m in models}:
+        prepare(*words)
 
 
 class Fleet:

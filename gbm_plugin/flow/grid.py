@@ -1,13 +1,14 @@
 """Values of a periodic field on a grid of equal cells: between its nodes, and their derivatives at the nodes."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..compiled import kernel, only_read, part
 
 WORDS = ("trilinear", "cubic")
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def trilinear(fields, points, out):
     """out (P, m) from fields (m, nx, ny, nz) at points (P, 3) in units of cells. Error O(h^2), continuous."""
     _, nx, ny, nz = fields.shape
@@ -26,7 +27,7 @@ def trilinear(fields, points, out):
             out[p, m] = near * (1 - a) + far * a
 
 
-@njit(nogil=True, cache=True)
+@part
 def _cubic_row(x, count, weights, nodes):
     """The four of `count` periodic nodes around x, and Lagrange's weights of them; returns the place in between."""
     i = int(np.floor(x))
@@ -40,7 +41,7 @@ def _cubic_row(x, count, weights, nodes):
     return s
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def cubic(fields, points, out):
     """As `trilinear`, with Lagrange cubics through the four nearest nodes in each direction. Error O(h^4)."""
     weights = np.empty((3, 4))
@@ -64,11 +65,11 @@ def on_grid(word: str, fields: NDArray, points: NDArray) -> NDArray:
     """Interpolate fields (m, nx, ny, nz), nodes at 0, 1, 2, ..., at points (P, 3) in units of cells, which
     need not lie inside the box: (P, m)."""
     out = np.empty((len(points), len(fields)))
-    {"trilinear": trilinear, "cubic": cubic}[word](fields, points, out)
+    {"trilinear": trilinear, "cubic": cubic}[word](only_read(fields), only_read(points), out)
     return out
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _cubic_slopes(fields, points, out):
     """out (P, m, 3): derivatives of the interpolant of `cubic` in units of cells."""
     weights, slopes = np.empty((3, 4)), np.empty((3, 4))
@@ -100,11 +101,11 @@ def cubic_gradient(velocity: NDArray, points: NDArray, spacing: NDArray) -> NDAr
     """du_i/dx_j (P, 3, 3) of the `cubic` interpolant of a velocity (3, nx, ny, nz), points as in `on_grid`. Error
     O(h^3)."""
     out = np.empty((len(points), 3, 3))
-    _cubic_slopes(velocity, points, out)
+    _cubic_slopes(only_read(velocity), only_read(points), out)
     return out / spacing
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _add_difference(f, factor, out):
     """out += factor (f[i+1] - f[i-1]) in the middle one of three periodic directions."""
     before, n, after = f.shape
@@ -118,7 +119,7 @@ def add_derivative(f: NDArray, axis: int, spacing: float, factor: float, out: ND
     """out += factor df/dx_axis at the nodes, f and out (nx, ny, nz), contiguous, by central differences (as
     OpenFOAM's `Gauss linear`)."""
     shape = (int(np.prod(f.shape[:axis])), f.shape[axis], int(np.prod(f.shape[axis + 1 :])))
-    _add_difference(f.reshape(shape), factor / (2 * spacing), out.reshape(shape))
+    _add_difference(only_read(f).reshape(shape), factor / (2 * spacing), out.reshape(shape))
 
 
 def rotation(velocity: NDArray, spacing: NDArray) -> NDArray:

@@ -5,10 +5,12 @@ Z(k) = A(k) + i B(k) and Z(-k) = conj A(k) + i conj B(k); in physical space prod
 view.
 """
 
-from numba import njit
+from functools import partial
+
+from ..compiled import kernel
 
 # sums may be reordered and fused; infinities and NaN keep their meaning
-jit = njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+jit = partial(kernel, fastmath={"contract", "reassoc", "nsz"})
 
 
 @jit

@@ -106,7 +106,7 @@ def test_welcome_is_a_list_of_integers():
         (b"HTTP" + bytes(36), "not a message of a gbm plugin"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION + 1, 1, 0, 0, 0, 0.0, 0), f"version {VERSION + 1}"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 0, 0, 0, 0, 0.0, 0), "unknown kind 0"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 9, 0, 0, 0, 0.0, 0), "unknown kind 9"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 10, 0, 0, 0, 0.0, 0), "unknown kind 10"),
         (
             b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 0, 0, 0.0, MAX_TEXT + 1),
             f"announces {MAX_TEXT + 1} bytes",

@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 import time
 
-import numba
 import numpy as np
 
 from gbm_plugin.fiber import Fibers, simulate
+from gbm_plugin.fiber.threads import available, limited_to
 from gbm_plugin.flow import TaylorGreen
 
 from ..study import option
@@ -111,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(fibers=1000, beads=20, repeats=3, quick=False) -> dict:
     """All measurements, quick without the long ones; on one thread except where two are compared."""
-    threads = numba.get_num_threads()
+    threads = available()
     soft = VISCOSITY * 0.1**4 / 0.01  # eq. (10) allows the step of 0.01
     cases = {
         "ab3": (fibers, beads, soft, 200, {"integrator": "ab3"}),
@@ -126,26 +126,22 @@ def run(fibers=1000, beads=20, repeats=3, quick=False) -> dict:
         cases["ab3, 10000 fibers"] = (10_000, beads, soft, 20, {"integrator": "ab3"})
         cases["ab3, 100000 fibers"] = (100_000, beads, soft, 5, {"integrator": "ab3"})
     result = {"speed": {}, "threads": {}}
-    try:
-        numba.set_num_threads(1)
+    with limited_to(1):
         for name, (count, n, stiffness, steps, options) in cases.items():
             case = bent_fibers(count, n, stiffness)
             simulate(case, TaylorGreen(np.pi, 0.1), 0.01, 0.05, **options)  # compiles
             result["speed"][name] = bead_steps(case, 0.01, steps, repeats, **options)
-        if threads > 1:
-            for name in ("ab3", "implicit"):
-                count, n, stiffness, steps, options = cases[name]
-                case = bent_fibers(count, n, stiffness)
-                rates = []
-                for number in (1, 2):
-                    numba.set_num_threads(number)
-                    row = bead_steps(case, 0.01, steps, repeats, time.perf_counter, **options)
-                    rates.append(row["bead_steps_per_second"])
-                result["threads"][name] = rates[1] / rates[0]
-        numba.set_num_threads(1)
         result["accuracy"] = time_to_accuracy()
-    finally:
-        numba.set_num_threads(threads)
+    if threads > 1:
+        for name in ("ab3", "implicit"):
+            count, n, stiffness, steps, options = cases[name]
+            case = bent_fibers(count, n, stiffness)
+            rates = []
+            for number in (1, 2):
+                with limited_to(number):
+                    row = bead_steps(case, 0.01, steps, repeats, time.perf_counter, **options)
+                rates.append(row["bead_steps_per_second"])
+            result["threads"][name] = rates[1] / rates[0]
     return result
 
 

@@ -124,6 +124,13 @@ Foam::message Foam::connection::receive
     message m;
     read(m, most);
 
+    // each a sign of life, after which the patience is as long again
+    while (m.head.type == message::WAIT && expected == message::WELCOME)
+    {
+        Info<< "fiber coupling: " << m.text().c_str() << endl;
+        read(m, most);
+    }
+
     if (m.head.type == message::ERROR)
     {
         fail("the daemon stopped: " + m.text());

@@ -31,11 +31,11 @@ Foam::string Foam::message::name() const
     static const char* names[] =
     {
         "HELLO", "WELCOME", "POSITIONS", "SAMPLE", "SAVE", "END", "GOODBYE",
-        "ERROR"
+        "ERROR", "WAIT"
     };
 
     return
-        head.type >= HELLO && head.type <= ERROR
+        head.type >= HELLO && head.type <= WAIT
       ? string(names[head.type - 1])
       : string("message of unknown type " + std::to_string(head.type));
 }

@@ -1,0 +1,27 @@
+"""Every kernel that a choice of words needs, compiled or loaded before a run waits for it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .fibers import Fibers
+from .stepper import Stepper
+
+
+def prepare(integrator="ab3", mobility="freeDrain", strain_coupling=False, repulsion=0.0) -> None:
+    """Move one small fiber with these options of a Stepper, by all that runs call."""
+    fibers = Fibers.straight(1, 3, 1.0, 1.0, 1.0)
+    stepper = Stepper(fibers, 0.0, integrator, mobility, strain_coupling, repulsion=repulsion)
+    extra = np.zeros((1, 3, 3, 3) if stepper.need == "gradient" else (1, 3, 3))
+
+    def observe():
+        stepper.observe(stepper.time, np.zeros((1, 3, 3)), extra)
+
+    observe()
+    for step in (1e-3, 1.0):  # both sides of eq. (10), between which auto chooses
+        stepper.advance(step)
+        observe()
+        stepper.correct()
+        observe()
+    stepper.prediction_gap.sum()
+    stepper.restore(stepper.state())

@@ -1,0 +1,29 @@
+"""A daemon that prepares for longer than the solver's patience says so, and the solver waits."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from conftest import start_solver
+
+SLOW_START = Path(__file__).with_name("slow_start.py")
+
+
+def test_the_solver_waits_knowingly(case):
+    timeout = 6
+    path = case(cells=12, steps=2, timeout=timeout)
+    log = path / "log.gbmDaemon"
+    with log.open("w") as output:
+        argv = [sys.executable, str(SLOW_START), str(path), str(1.5 * timeout)]
+        daemon = subprocess.Popen(argv, stdout=output, stderr=output)
+    try:
+        while "waiting for OpenFOAM" not in log.read_text() and daemon.poll() is None:
+            time.sleep(0.05)
+        solver = start_solver(path)
+        said = (path / "log.pimpleFoam").read_text
+        assert solver.wait(240) == 0, said()[-2000:]
+        assert daemon.wait(60) == 0, log.read_text()[-2000:]
+    finally:
+        daemon.kill()
+    assert said().count("fiber coupling: the daemon prepares its kernels and fibers") >= 2
