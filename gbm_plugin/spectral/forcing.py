@@ -4,10 +4,13 @@ A force enters the momentum equation as `rate(energy) * (u - <u>)` plus a field 
 `add(rhs)`; it moves on with `advance(time_step)` after every step of the flow.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gbm_plugin.spectral.arrays import Array, Arrays
+from gbm_plugin.spectral.normals import normals
 
 Value = NDArray | float
 
@@ -74,9 +77,9 @@ class EswaranPope(Forcing):
     T_L; the force is its solenoidal part b - k (k.b)/k^2. For small T_L the power is 4 variance T_L N_F,
     with N_F the number of modes.
 
-    The noise of step m depends on (seed, m) alone and modes are drawn in order of |k|, so a run is
-    reproduced exactly by its seed, on any machine and at any resolution. The force is constant over a time
-    step.
+    The processes move on once in a step, exactly for any length of it. The noise of step m depends on (seed, m)
+    alone and modes are drawn in order of |k|: a run is reproduced exactly by its seed and time steps, on any machine
+    and at any resolution, and eswaranPope of the OpenFOAM plugin has the same force at the same times.
     """
 
     def __init__(self, *, variance: float, time_scale: float, cutoff: float, seed: int):
@@ -86,8 +89,8 @@ class EswaranPope(Forcing):
             raise ValueError(f"time_scale of EswaranPope must be positive, got {time_scale}")
         if not 1 <= cutoff < np.inf:
             raise ValueError(f"cutoff of EswaranPope must be at least 1 (in units of 2 pi/box), got {cutoff}")
-        if seed != int(seed) or seed < 0:
-            raise ValueError(f"seed of EswaranPope must be a whole number of at least 0, got {seed}")
+        if seed != int(seed) or not 0 <= seed < 2**64:
+            raise ValueError(f"seed of EswaranPope must be a whole number from 0 to 2^64 - 1, got {seed}")
         self.variance, self.time_scale, self.cutoff = float(variance), float(time_scale), float(cutoff)
         self.seed, self.draws = int(seed), 0
         self._k = half_shell(self.cutoff)
@@ -122,8 +125,9 @@ class EswaranPope(Forcing):
             component[self._index] += self._operators.xp.asarray(values, rhs.dtype)
 
     def advance(self, time_step: float) -> None:
-        memory = np.exp(-time_step / self.time_scale)
-        self._b = memory * self._b + np.sqrt(1 - memory**2) * self._noise()
+        # of the C library, as in the plugin: NumPy's own differ in the last bit
+        memory = math.exp(-time_step / self.time_scale)
+        self._b = memory * self._b + math.sqrt(-math.expm1(-2 * time_step / self.time_scale)) * self._noise()
 
     def input(self, u: Array, energy: float) -> float:
         velocity = self._operators.host(u[(slice(None), *self._index)]).astype(complex)
@@ -145,10 +149,9 @@ class EswaranPope(Forcing):
 
     def _noise(self) -> NDArray:
         """Independent complex normal amplitudes (M, 3) of the given variance."""
-        generator = np.random.Generator(np.random.Philox(key=self.seed, counter=[0, 0, self.draws, 0]))
+        pairs = normals(self.seed, self.draws, 6 * len(self._k)).reshape(-1, 3, 2)
         self.draws += 1
-        pairs = generator.standard_normal((len(self._k), 3, 2))
-        return np.sqrt(self.variance) * (pairs[..., 0] + 1j * pairs[..., 1])
+        return math.sqrt(self.variance) * (pairs[..., 0] + 1j * pairs[..., 1])
 
 
 def half_shell(cutoff: float) -> NDArray:

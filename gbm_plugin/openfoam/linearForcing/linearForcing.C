@@ -1,12 +1,6 @@
 #include "linearForcing.H"
-#include "allowedEntries.H"
-#include "consistentStart.H"
-#include "keepEarlier.H"
-#include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvMatrices.H"
-#include "fvmSup.H"
-#include "IFstream.H"
 #include "surfaceFields.H"
 
 namespace Foam
@@ -36,50 +30,11 @@ Foam::fv::linearForcing::linearForcing
     const fvMesh& mesh
 )
 :
-    option(name, modelType, dict, mesh),
-    writeFile(mesh, name, name),
-    nu_(0),
-    timeIndex_(-1),
-    A_(0),
-    kOld_(0),
-    hasOld_(false)
+    turbulenceForcing(name, modelType, dict, mesh),
+    A_(0)
 {
     read(dict);
-    fieldNames_.setSize(1, UName_);
-    applied_.setSize(1, false);
-    consistentStart(mesh, UName_, phiName_);
-    readState();
-
-    if (Pstream::master())
-    {
-        writePrecision_ = 12;
-        keepEarlier(baseTimeDir()/(name + ".dat"));
-        resetFile(name);
-        writeFile::writeHeader(file(), "Linear forcing, SI units, per unit mass");
-        writeCommented(file(), "Time");
-        for
-        (
-            const char* column :
-            {
-                "k", "epsilonBudget", "epsilonGradient", "epsilonLaplacian",
-                "uPrime", "ReLambda", "eta", "A", "power",
-                "meanUx", "meanUy", "meanUz"
-            }
-        )
-        {
-            writeTabbed(file(), column);
-        }
-        file() << endl;
-    }
-}
-
-
-Foam::fv::linearForcing::~linearForcing()
-{
-    if (row_.valid())
-    {
-        writeRow(rowTime_, row_());
-    }
+    start();
 }
 
 
@@ -87,15 +42,7 @@ Foam::fv::linearForcing::~linearForcing()
 
 bool Foam::fv::linearForcing::read(const dictionary& dict)
 {
-    option::read(dict);
-
-    wordList entries
-    ({
-        "type", "active", "mode", "A", "power", "U", "phi", "libs",
-        typeName + "Coeffs"
-    });
-    allowedEntries(dict, entries);
-    allowedEntries(coeffs_, entries);
+    readCommon(dict, {"mode", "A", "power"});
 
     mode_ = modeNames.get("mode", coeffs_);
 
@@ -119,60 +66,7 @@ bool Foam::fv::linearForcing::read(const dictionary& dict)
             << exit(FatalIOError);
     }
 
-    UName_ = coeffs_.lookupOrDefault<word>("U", "U");
-    phiName_ = coeffs_.lookupOrDefault<word>("phi", "phi");
-
     return true;
-}
-
-
-Foam::fileName Foam::fv::linearForcing::statePath(const word& timeName) const
-{
-    return mesh_.time().path()/timeName/"uniform"/option::name();
-}
-
-
-void Foam::fv::linearForcing::readState()
-{
-    const fileName path(statePath(mesh_.time().timeName()));
-
-    if (Pstream::master() && isFile(path))
-    {
-        IFstream is(path);
-        const dictionary state(is);
-        state.readEntry("k", kOld_);
-        state.readEntry("power", powerOld_);
-        state.readEntry("deltaT", deltaTOld_);
-        hasOld_ = true;
-        Info<< "    Continuing from the state in " << path << endl;
-    }
-    Pstream::scatter(hasOld_);
-    Pstream::scatter(kOld_);
-    Pstream::scatter(powerOld_);
-    Pstream::scatter(deltaTOld_);
-}
-
-
-void Foam::fv::linearForcing::writeState() const
-{
-    if (!Pstream::master() || !hasOld_)
-    {
-        return;
-    }
-
-    // under another name until it is whole
-    const fileName path(statePath(mesh_.time().timeName()));
-    mkDir(path.path());
-    {
-        OFstream os(path + ".part");
-        os.precision(17);
-        os  << "// state of " << typeName
-            << ": energy and power one step before this time" << nl;
-        os.writeEntry("k", kOld_);
-        os.writeEntry("power", powerOld_);
-        os.writeEntry("deltaT", deltaTOld_);
-    }
-    mv(path + ".part", path);
 }
 
 
@@ -185,83 +79,26 @@ Foam::scalar Foam::fv::linearForcing::coefficient(const scalar k) const
 }
 
 
-void Foam::fv::linearForcing::writeRow
+Foam::scalar Foam::fv::linearForcing::power
 (
-    const scalar time,
+    const volVectorField&,
     const flowStatistics& s
-)
+) const
 {
-    const scalar power = 2*s.k*coefficient(s.k);
-    const scalar uPrime = Foam::sqrt(2*s.k/3);
-    const scalar epsilon = max(s.epsilonLaplacian, VSMALL);
-
-    // over the step that ends here; at a start no step has ended
-    const scalar epsilonBudget =
-        hasOld_
-      ? 0.5*(power + powerOld_) - (s.k - kOld_)/deltaTOld_
-      : s.epsilonLaplacian;
-
-    if (Pstream::master())
-    {
-        file()
-            << setprecision(writePrecision_) << time
-            << token::TAB << s.k
-            << token::TAB << epsilonBudget
-            << token::TAB << s.epsilonGradient
-            << token::TAB << s.epsilonLaplacian
-            << token::TAB << uPrime
-            << token::TAB << Foam::sqrt(15/(nu_*epsilon))*sqr(uPrime)
-            << token::TAB << Foam::pow025(pow3(nu_)/epsilon)
-            << token::TAB << coefficient(s.k)
-            << token::TAB << power
-            << token::TAB << s.mean.x()
-            << token::TAB << s.mean.y()
-            << token::TAB << s.mean.z()
-            << endl;
-    }
+    return 2*s.k*coefficient(s.k);
 }
 
 
-void Foam::fv::linearForcing::beginStep(const volVectorField& U)
+void Foam::fv::linearForcing::choose(const flowStatistics& now)
 {
-    const scalar deltaT = mesh_.time().deltaTValue();
-    nu_ = kinematicViscosity(mesh_);
-    const flowStatistics now(U, nu_);
-
-    if (!std::isfinite(now.k))
-    {
-        FatalErrorInFunction
-            << "the velocity is not finite (k = " << now.k << ") at time "
-            << mesh_.time().value() - deltaT << exit(FatalError);
-    }
-
-    writeRow(mesh_.time().value() - deltaT, now);
-
-    // energy at the end of the step, for the implicit force
-    const scalar k =
-        hasOld_ ? now.k + (now.k - kOld_)*deltaT/deltaTOld_ : now.k;
-    A_ = coefficient(k > 0.5*now.k ? k : now.k);
-
-    kOld_ = now.k;
-    powerOld_ = 2*now.k*coefficient(now.k);
-    deltaTOld_ = deltaT;
-    hasOld_ = true;
+    A_ = coefficient(energyAtForce(now.k));
 }
 
 
-void Foam::fv::linearForcing::addSup(fvMatrix<vector>& eqn, const label)
+void Foam::fv::linearForcing::add(fvMatrix<vector>& eqn) const
 {
-    const volVectorField& U = eqn.psi();
-
-    if (timeIndex_ != mesh_.time().timeIndex())
-    {
-        timeIndex_ = mesh_.time().timeIndex();
-        row_.clear();
-        beginStep(U);
-    }
-
     // A U implicit and -A mean explicit, without a matrix of their own
-    const vector mean(flowStatistics::average(U));
+    const vector mean(flowStatistics::average(eqn.psi()));
     const scalarField& V = mesh_.V();
     scalarField& diag = eqn.diag();
     vectorField& source = eqn.source();
@@ -274,19 +111,6 @@ void Foam::fv::linearForcing::addSup(fvMatrix<vector>& eqn, const label)
 }
 
 
-void Foam::fv::linearForcing::addSup
-(
-    const volScalarField&,
-    fvMatrix<vector>&,
-    const label
-)
-{
-    FatalErrorInFunction
-        << typeName << " is for incompressible solvers"
-        << exit(FatalError);
-}
-
-
 void Foam::fv::linearForcing::removeMean
 (
     volVectorField& U,
@@ -296,7 +120,7 @@ void Foam::fv::linearForcing::removeMean
     U -= dimensionedVector("mean", dimVelocity, mean);
 
     surfaceScalarField* phi =
-        mesh_.getObjectPtr<surfaceScalarField>(phiName_);
+        mesh_.getObjectPtr<surfaceScalarField>(phiName());
     if (!phi)
     {
         return;
@@ -322,22 +146,9 @@ void Foam::fv::linearForcing::correct(volVectorField& U)
 {
     const vector mean(flowStatistics::average(U));
 
-    if (mag(mean) > meanTolerance*Foam::sqrt(kOld_))
+    if (mag(mean) > meanTolerance*Foam::sqrt(energy()))
     {
         removeMean(U, mean);
     }
-
-    if (mesh_.time().writeTime())
-    {
-        writeState();
-    }
-
-    // No step follows the last one, in which its row would be written. The
-    // last call in a step cannot be told, so each replaces the one before.
-    const Time& time = mesh_.time();
-    if (time.value() > time.endTime().value() - 0.5*time.deltaTValue())
-    {
-        rowTime_ = time.value();
-        row_.reset(new flowStatistics(U, nu_));
-    }
+    turbulenceForcing::correct(U);
 }

@@ -1,0 +1,186 @@
+#include "eswaranPope.H"
+#include "periodicBox.H"
+#include "addToRunTimeSelectionTable.H"
+#include "fvMatrices.H"
+
+namespace Foam
+{
+namespace fv
+{
+    defineTypeNameAndDebug(eswaranPope, 0);
+    addToRunTimeSelectionTable(option, eswaranPope, dictionary);
+}
+}
+
+
+// * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
+
+Foam::fv::eswaranPope::eswaranPope
+(
+    const word& name,
+    const word& modelType,
+    const dictionary& dict,
+    const fvMesh& mesh
+)
+:
+    turbulenceForcing(name, modelType, dict, mesh)
+{
+    read(dict);
+    waves_.reset(new waveSum(mesh, process_->k()));
+    start();
+}
+
+
+// * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
+
+Foam::scalar Foam::fv::eswaranPope::positive(const word& entry) const
+{
+    const scalar value = coeffs_.get<scalar>(entry);
+
+    if (!(value > 0))
+    {
+        FatalIOErrorInFunction(coeffs_)
+            << entry << " = " << value << " must be positive"
+            << exit(FatalIOError);
+    }
+    return value;
+}
+
+
+void Foam::fv::eswaranPope::checkMesh(const scalar cutoff) const
+{
+    const vector L(mesh_.bounds().span());
+
+    if
+    (
+        !periodicBox::fills(mesh_)
+     || max(mag(L.y() - L.x()), mag(L.z() - L.x())) > 1e-6*L.x()
+    )
+    {
+        FatalErrorInFunction
+            << "the mesh, of " << L << " m, is not a whole, periodic cube: "
+            << type() << " forces shells of wavenumbers of a cube"
+            << exit(FatalError);
+    }
+
+    // of the finest waves that the spectral solver keeps
+    const scalar n = std::cbrt(scalar(returnReduce(mesh_.nCells(), sumOp<label>())));
+    const label limit = label((n + 1e-6 - 1)/3);
+
+    if (cutoff > limit)
+    {
+        FatalIOErrorInFunction(coeffs_)
+            << "cutoff = " << cutoff << " must not exceed " << limit
+            << " at " << label(n + 0.5) << " cells per edge"
+            << exit(FatalIOError);
+    }
+}
+
+
+// * * * * * * * * * * * * Protected Member Functions  * * * * * * * * * * * //
+
+Foam::scalar Foam::fv::eswaranPope::power
+(
+    const volVectorField& U,
+    const flowStatistics&
+) const
+{
+    const scalarField& V = mesh_.V();
+    const vectorField& u = U.primitiveField();
+    scalar sum = 0;
+    scalar volume = 0;
+
+    waves_->sum
+    (
+        process_->force(),
+        [&](const label first, const scalarField (&f)[vector::nComponents])
+        {
+            forAll(f[0], i)
+            {
+                const label celli = first + i;
+                sum += V[celli]*(u[celli] & vector(f[0][i], f[1][i], f[2][i]));
+                volume += V[celli];
+            }
+        }
+    );
+    reduce(sum, sumOp<scalar>());
+    reduce(volume, sumOp<scalar>());
+
+    return sum/volume;
+}
+
+
+void Foam::fv::eswaranPope::choose(const flowStatistics&)
+{
+    if (atStart())
+    {
+        force_ = process_->force();
+    }
+    process_->advance(mesh_.time().deltaTValue());
+    if (!atStart())
+    {
+        force_ = process_->force();
+    }
+}
+
+
+void Foam::fv::eswaranPope::add(fvMatrix<vector>& eqn) const
+{
+    const scalarField& V = mesh_.V();
+    vectorField& source = eqn.source();
+
+    waves_->sum
+    (
+        force_,
+        [&](const label first, const scalarField (&f)[vector::nComponents])
+        {
+            forAll(f[0], i)
+            {
+                const label celli = first + i;
+                source[celli] -= V[celli]*vector(f[0][i], f[1][i], f[2][i]);
+            }
+        }
+    );
+}
+
+
+void Foam::fv::eswaranPope::readState(const dictionary& state)
+{
+    process_->read(state);
+}
+
+
+void Foam::fv::eswaranPope::writeState(Ostream& os) const
+{
+    process_->write(os);
+}
+
+
+// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
+
+bool Foam::fv::eswaranPope::read(const dictionary& dict)
+{
+    readCommon(dict, {"variance", "timeScale", "cutoff", "seed"});
+
+    const scalar variance = positive("variance");
+    const scalar timeScale = positive("timeScale");
+    const scalar cutoff = positive("cutoff");
+    const label seed = coeffs_.lookupOrDefault<label>("seed", 1);
+
+    if (cutoff < 1)
+    {
+        FatalIOErrorInFunction(coeffs_)
+            << "cutoff = " << cutoff << " must be at least 1, in waves per edge"
+            << exit(FatalIOError);
+    }
+    if (seed < 0)
+    {
+        FatalIOErrorInFunction(coeffs_)
+            << "seed = " << seed << " must not be negative"
+            << exit(FatalIOError);
+    }
+    checkMesh(cutoff);
+    process_.reset(new shellProcess(variance, timeScale, cutoff, seed));
+
+    return true;
+}
