@@ -171,9 +171,9 @@ class Dictionary:
     def names(self) -> list[str]:
         return list(self._entries)
 
-    def subs(self, others: bool = False) -> list[Dictionary]:
-        """All entries, each of which must be a dictionary; with `others`, those that are."""
-        return [self.sub(n) for n, value in self._entries.items() if not others or isinstance(value, dict)]
+    def subs(self, others: bool = False) -> dict[str, Dictionary]:
+        """All entries by name, each of which must be a dictionary; with `others`, those that are."""
+        return {n: self.sub(n) for n, value in self._entries.items() if not others or isinstance(value, dict)}
 
     def done(self) -> None:
         """CaseError where an entry is none of those that were asked for."""

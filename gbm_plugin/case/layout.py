@@ -12,8 +12,7 @@ from .share import WHOLE, Share, shared_files
 STATE_FILE = "uniform/fibers.npz"  # of a single daemon; of several: fibers.<number>of<daemons>.npz
 PREVIOUS = "previous"
 RESULTS = "postProcessing"
-FIBERS, FLOW = "fibers", "linearForcing"  # folders there
-FLOW_TABLE = "linearForcing.dat"
+FIBERS = "fibers"  # a folder there
 COUPLING_TABLE = "coupling.dat"
 VELOCITY = ("U", "U.gz")
 
@@ -21,6 +20,11 @@ VELOCITY = ("U", "U.gz")
 def results(case: Path | str, kind: str = FIBERS) -> Path:
     """The folder of what one function object or source writes, a folder in it for each start time."""
     return Path(case) / RESULTS / kind
+
+
+def flow_table(forcing: str) -> str:
+    """The file of a forcing's row a step, in the results of that name."""
+    return f"{forcing}.dat"
 
 
 def recording_name(share: Share = WHOLE) -> str:

@@ -70,8 +70,12 @@ class Family:
 
 @dataclass(frozen=True)
 class Forcing:
-    """An active entry of constant/fvOptions that drives turbulence, by its type, with its numbers."""
+    """An active entry of constant/fvOptions that drives turbulence: its name, its type and its numbers.
 
+    The name is that of its table, postProcessing/<name>/<start>/<name>.dat.
+    """
+
+    name: str
     type: str
     values: dict[str, float | str]
 
@@ -196,9 +200,7 @@ def _read_model(d: Dictionary, default: Model) -> Model:
 def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:
     model = _read_model(fibers, Model())
     group = fibers.sub("families")
-    families = tuple(
-        _read_family(case, name, d, model) for name, d in zip(group.names, group.subs(), strict=True)
-    )
+    families = tuple(_read_family(case, name, d, model) for name, d in group.subs().items())
     if not families:
         raise fibers.fail("families", "is empty: at least one family of fibers is needed")
     return families
@@ -277,7 +279,7 @@ def _read_forcing(case: Path) -> Forcing | None:
     if "options" in options:
         options = options.sub("options")
     forcing = None
-    for d in options.subs(others=True):
+    for name, d in options.subs(others=True).items():
         kind = d.word("type")
         if kind not in ("linearForcing", "eswaranPope") or not d.switch("active", True):
             continue
@@ -286,20 +288,21 @@ def _read_forcing(case: Path) -> Forcing | None:
         coeffs = d.sub(f"{kind}Coeffs") if f"{kind}Coeffs" in d else d
         for entry in ("type", "active", "U", "phi", "libs"):
             coeffs.raw(entry, None)
-        forcing = _linear_forcing(coeffs) if kind == "linearForcing" else _eswaran_pope(coeffs)
+        values = _linear_forcing(coeffs) if kind == "linearForcing" else _eswaran_pope(coeffs)
+        forcing = Forcing(name, kind, values)
         coeffs.done()
     return forcing
 
 
-def _linear_forcing(d: Dictionary) -> Forcing:
+def _linear_forcing(d: Dictionary) -> dict[str, float | str]:
     mode = d.word("mode", ("constantCoefficient", "constantPower"))
     entry = "A" if mode == "constantCoefficient" else "power"
-    return Forcing("linearForcing", {"mode": mode, entry: d.number(entry, least=0)})
+    return {"mode": mode, entry: d.number(entry, least=0)}
 
 
-def _eswaran_pope(d: Dictionary) -> Forcing:
-    values = {name: d.number(name, above=0) for name in ("variance", "timeScale", "cutoff")}
-    return Forcing("eswaranPope", {**values, "seed": d.integer("seed", 1, least=0)})
+def _eswaran_pope(d: Dictionary) -> dict[str, float | str]:
+    values = {name: d.number(name, above=0) for name in ("variance", "timeScale")}
+    return {**values, "cutoff": d.number("cutoff", least=1), "seed": d.integer("seed", 1, least=0)}
 
 
 def _read_viscosity(case: Path) -> float:

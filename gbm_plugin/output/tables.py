@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.layout import flow_table, results
 from .restarts import files_by_start, kept
 
 _ENTRY = re.compile(r"\(([^()]*)\)|([^\s()]+)")
@@ -34,6 +36,24 @@ def read_dat(folder: Path | str, name: str) -> dict[str, NDArray[np.float64]]:
         column: np.concatenate([table[column][:count] for table, count in zip(tables, counts, strict=True)])
         for column in tables[0]
     }
+
+
+def read_forcing(case: Path | str) -> dict[str, NDArray[np.float64]]:
+    """The table of energies that the forcing of a run writes, postProcessing/<name>/<start>/<name>.dat, whatever its
+    name; of several forcings that of the newest. Raises as `read_dat`."""
+    folder = results(case, "")
+    found = [path for path in folder.glob("*/*/*.dat") if path.name == flow_table(path.parents[1].name)]
+    found = [path for path in found if _has_column(path, "epsilonBudget")]
+    if not found:
+        raise FileNotFoundError(f"no table of a forcing, <forcing>/<start time>/<forcing>.dat, in {folder}")
+    newest = max(found, key=lambda path: path.stat().st_mtime)
+    return read_dat(newest.parents[1], newest.name)
+
+
+def _has_column(file: Path, name: str) -> bool:
+    with file.open(errors="replace") as lines:
+        header = itertools.takewhile(lambda line: line.startswith("#"), lines)
+        return any(name in line.split() for line in header)
 
 
 def _read_one(file: Path) -> dict[str, NDArray[np.float64]]:

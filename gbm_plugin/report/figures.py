@@ -19,7 +19,7 @@ _KOLMOGOROV = 1.6  # constant of E = C ε^(2/3) k^(-5/3), Sreenivasan 1995
 
 
 def energy_figure(table: Mapping[str, NDArray]) -> Figure:
-    """Kinetic energy and dissipation against time from the columns of linearForcing.dat that are there."""
+    """Kinetic energy and dissipation against time from the columns of the forcing's table that are there."""
     figure = new_figure(6.4, 5.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
     if "k" in table:

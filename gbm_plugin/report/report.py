@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..case.layout import FLOW, FLOW_TABLE, results
+from ..case.layout import results
 from ..files import replaced, write_text
 from ..output.field import box_mesh, latest_time, read_velocity, vorticity_magnitude
 from ..output.recording import Recording, open_recording
-from ..output.tables import read_dat
+from ..output.tables import read_forcing
 from ..statistics import fibers as shape
 from ..statistics.turbulence import energy_spectrum
 from .figures import end_to_end_figure, energy_figure, spectrum_figure
@@ -21,7 +21,7 @@ from .paraview import write_series
 from .picture import fibers_picture
 from .style import save, styled
 
-_FLOW = {  # column of linearForcing.dat: key figure
+_FLOW = {  # column of the forcing's table: key figure
     "k": "kinetic_energy",
     "epsilonBudget": "dissipation_budget",
     "epsilonGradient": "dissipation_gradient",
@@ -80,11 +80,11 @@ def _attempt(key: dict, what: str, function, *arguments):
 
 
 def _flow(case: Path, folder: Path, key: dict) -> dict[str, NDArray]:
-    table = read_dat(results(case, FLOW), FLOW_TABLE)
+    table = read_forcing(case)
     if not len(table["Time"]):
-        raise ValueError("linearForcing.dat has no lines")
+        raise ValueError("the table of the forcing has no lines")
     key["not_drawn"] += [
-        f"{name}: no such column in linearForcing.dat" for name in _FLOW if name not in table
+        f"{name}: no such column in the table of the forcing" for name in _FLOW if name not in table
     ]
     key["files"] += [_write_csv(folder / "flow.csv", table), *save(energy_figure(table), folder, "energy")]
     late = _second_half(table["Time"])
@@ -143,7 +143,7 @@ def _scales(time: float, k: NDArray, spectrum: NDArray, table: dict | None, reco
         row = int(np.argmin(np.abs(table["Time"] - time)))
         epsilon, eta = float(table["epsilonBudget"][row]), float(table["eta"][row])
         if epsilon > 0 and eta > 0 and abs(table["Time"][row] - time) <= 0.01 * np.ptp(table["Time"]):
-            return epsilon, eta, "epsilonBudget and eta of linearForcing.dat"
+            return epsilon, eta, "epsilonBudget and eta of the table of the forcing"
     if recording is not None:
         nu = recording.metadata["dynamic_viscosity"] / recording.metadata["density"]
         epsilon = float(2 * nu * (k[1] - k[0]) * (k**2 * spectrum).sum())

@@ -21,7 +21,7 @@ from ..case.prepare import prepare, ranks_of, reconstruct
 from ..case.scene import Scene, read_scene
 from ..case.share import Share, all_shares
 from ..case.times import choose_start
-from ..errors import CaseError, RunError
+from ..errors import RunError
 from ..files import created
 from ..output.restarts import keep_earlier
 from .progress import Progress
@@ -43,11 +43,6 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
     """
     case = Path(case).resolve()
     scene = read_scene(case)
-    if scene.forcing is not None and scene.forcing.type == "eswaranPope":
-        raise CaseError(
-            f"{case}/constant/fvOptions: eswaranPope is a forcing of the spectral solver; OpenFOAM has "
-            "linearForcing (gbm run --flow spectral runs this case)"
-        )
     ranks = ranks_of(case, parallel)
     with _only_run(case) as lock:
         start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
-from ..case.layout import FIBERS, FLOW, FLOW_TABLE, RESULTS
+from ..case.layout import FIBERS, RESULTS, flow_table
 
 log = logging.getLogger(__name__)
 
@@ -27,6 +27,7 @@ class Progress:
         self._case: Path = scene.case
         self._start = start_time
         self._end = scene.end_time
+        self._flow = f"{scene.forcing.name}/*/{flow_table(scene.forcing.name)}" if scene.forcing else ""
         columns = (
             TextColumn("t = {task.fields[now]} of " + f"{self._end:g} s"),
             BarColumn(BAR_WIDTH),
@@ -48,7 +49,7 @@ class Progress:
     def update(self) -> None:
         if self._bar.disable and clock.monotonic() - self._said < QUIET:
             return
-        flow = newest_row(self._case, f"{FLOW}/*/{FLOW_TABLE}")
+        flow = newest_row(self._case, self._flow) if self._flow else {}
         fibers = newest_row(self._case, f"{FIBERS}/*/daemon*.dat")
         time = fibers.get("Time", flow.get("Time", self._start))
         parts = [f"Re_λ {flow['ReLambda']:.3g}"] if "ReLambda" in flow else []

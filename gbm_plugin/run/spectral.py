@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..case.initial import read_initial_field
-from ..case.layout import FLOW, FLOW_TABLE, results
+from ..case.layout import flow_table, results
 from ..case.scene import Forcing, Scene
 from ..case.times import choose_start
 from ..errors import CaseError
@@ -109,7 +109,8 @@ class _SpectralFlow(Carrier):
         return self.solver.shifted_velocity(0.5)
 
     def open(self, name: str) -> None:
-        path = results(self.scene.case, FLOW) / name / FLOW_TABLE
+        forcing = self.scene.forcing.name if self.scene.forcing else "flow"
+        path = results(self.scene.case, forcing) / name / flow_table(forcing)
         path.parent.mkdir(parents=True, exist_ok=True)
         self.table = created(keep_earlier(path), buffering=1)
         self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")

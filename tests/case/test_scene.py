@@ -106,6 +106,10 @@ def test_mesh_of_several_blocks_is_openfoams_business(case):
             "f { type linearForcing; linearForcingCoeffs { mode constantPower; power 3; } }",
             ("linearForcing", "constantPower", 3.0),
         ),
+        (
+            "f { type eswaranPope; variance 2e-3; timeScale 3; cutoff 2; }",
+            ("eswaranPope", None, 2e-3),
+        ),
         ("f { type linearForcing; active no; mode constantPower; power 0.1; }", None),
         ("other { type meanVelocityForce; }", None),
     ],
@@ -117,8 +121,8 @@ def test_forcing(case, text, expected):
         assert forcing is None
     else:
         kind, mode, strength = expected
-        assert isinstance(forcing, Forcing) and forcing.type == kind
-        assert forcing.values["mode"] == mode and strength in forcing.values.values()
+        assert isinstance(forcing, Forcing) and (forcing.name, forcing.type) == ("f", kind)
+        assert forcing.values.get("mode") == mode and strength in forcing.values.values()
 
 
 def test_two_forcings_are_one_too_many(case):

@@ -36,11 +36,12 @@ CALLS = {
         1,
         "made at a start; whether U and phi are registered is the solver's doing",
     ),
-    "linearForcing/flowStatistics.C": (
+    "forcing/flowStatistics.C": (
         8,
         "schemes are of the case; called in addSup and correct of every rank",
     ),
-    "linearForcing/linearForcing.C": (4, "made for each run"),
+    "forcing/turbulenceForcing.C": (1, "made for each run"),
+    "eswaranPope/eswaranPope.C": (3, "made for each run; called in addSup and correct of every rank"),
     "fiberCoupling/fiberCoupling.C": (6, "once a step, provisional or not as all daemons together say"),
     "fiberCoupling/sampling/beadExchange.C": (2, "locate and collect of every rank, with beads or without"),
     "pressure/slab.C": (2, "made for each mesh"),

@@ -1,7 +1,9 @@
+import os
+
 import numpy as np
 import pytest
 
-from gbm_plugin.output.tables import read_dat
+from gbm_plugin.output.tables import read_dat, read_forcing
 
 
 def put(folder, start, text):
@@ -60,3 +62,17 @@ def test_missing_and_different(tmp_path):
     put(tmp_path, "1", "# Time e\n1 2\n")
     with pytest.raises(ValueError, match="has columns Time, e;"):
         read_dat(tmp_path, "some.dat")
+
+
+def test_the_table_of_a_forcing_is_found_by_its_columns(tmp_path):
+    """Whatever the forcing is called; of two the newer."""
+    with pytest.raises(FileNotFoundError, match="no table of a forcing"):
+        read_forcing(tmp_path)
+    for age, (name, columns) in enumerate(
+        [("old", "epsilonBudget"), ("stirring", "k\tepsilonBudget"), ("probes", "U")]
+    ):
+        file = tmp_path / "postProcessing" / name / "0" / f"{name}.dat"
+        file.parent.mkdir(parents=True)
+        file.write_text(f"# Time\t{columns}\n" + "\t".join("0123"[: 1 + len(columns.split())]) + "\n")
+        os.utime(file, (100 + age, 100 + age))
+    assert list(read_forcing(tmp_path)) == ["Time", "k", "epsilonBudget"]

@@ -117,7 +117,7 @@ def test_only_fibers(tmp_path):
     key = report(tmp_path)
     assert {"end_to_end.png", "fibers.png", "fibers.csv"} <= set(key["files"])
     assert key["flow"] is None and key["spectrum"] is None
-    assert len(key["not_drawn"]) == 2 and "linearForcing.dat" in key["not_drawn"][0]
+    assert len(key["not_drawn"]) == 2 and "no table of a forcing" in key["not_drawn"][0]
 
 
 def test_one_fiber_has_no_standard_error_and_json_no_nan(tmp_path):
@@ -139,7 +139,7 @@ def test_missing_column_is_said_and_nan_averages_are_null(tmp_path):
     at = names.index("epsilonGradient")
     file.write_text("".join("\t".join(row[:at] + row[at + 1 :]) + "\n" for row in lines))
     key = report(tmp_path)
-    assert "epsilonGradient: no such column in linearForcing.dat" in key["not_drawn"]
+    assert "epsilonGradient: no such column in the table of the forcing" in key["not_drawn"]
     assert key["flow"]["kolmogorov_length"] is None and "dissipation_gradient" not in key["flow"]
     assert json.loads((tmp_path / "report/report.json").read_text())["flow"]["kolmogorov_length"] is None
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 from gbm_plugin.spectral import EswaranPope, LinearForcing, SpectralSolver
 from gbm_plugin.spectral.forcing import half_shell
+from gbm_plugin.spectral.normals import logarithm, normals, turn
 
 from .fields import abc, noise, taylor_green
 
@@ -91,6 +93,20 @@ def test_number_of_forced_modes(square, count):
     k = half_shell(square**0.5)
     both = {tuple(v) for v in k} | {tuple(-v) for v in k}
     assert len(both) == count and (0, 0, 0) not in both
+
+
+def test_normal_numbers():
+    """Gaussian by Kolmogorov and Smirnov's test, and the functions in them to rounding."""
+    z = np.concatenate([normals(seed, step, 1000) for seed in (0, 7) for step in range(200)])
+    assert kstest(z, "norm").pvalue > 1e-3
+    assert z.var() == pytest.approx(1, abs=4 * np.sqrt(2 / len(z)))
+    # neighbours, steps and seeds know nothing of each other
+    for other in (np.roll(z, 1), np.roll(z, 2), np.roll(z, 1000), np.roll(z, 200_000)):
+        assert abs((z * other).mean()) < 4 / np.sqrt(len(z))
+    u = np.concatenate([2.0 ** -np.arange(54), (np.arange(1, 10**4) / 1e4), 1 - 2.0 ** -np.arange(1, 54)])
+    np.testing.assert_allclose(logarithm(u), np.log(u), rtol=1e-15, atol=1e-300)
+    v = u[u < 1]
+    np.testing.assert_allclose(turn(v), (np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)), atol=1e-15)
 
 
 def test_eswaran_pope_is_solenoidal_with_the_stated_variance_and_memory():

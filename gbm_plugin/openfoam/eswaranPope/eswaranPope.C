@@ -49,22 +49,25 @@ Foam::scalar Foam::fv::eswaranPope::positive(const word& entry) const
 
 void Foam::fv::eswaranPope::checkMesh(const scalar cutoff) const
 {
+    string why(periodicBox::problem(mesh_));
     const vector L(mesh_.bounds().span());
 
-    if
-    (
-        !periodicBox::fills(mesh_)
-     || max(mag(L.y() - L.x()), mag(L.z() - L.x())) > 1e-6*L.x()
-    )
+    if (why.empty() && max(mag(L.y() - L.x()), mag(L.z() - L.x())) > 1e-6*L.x())
+    {
+        OStringStream sides;
+        sides << "its sides are " << L.x() << ", " << L.y() << " and " << L.z();
+        why = sides.str();
+    }
+    if (!why.empty())
     {
         FatalErrorInFunction
-            << "the mesh, of " << L << " m, is not a whole, periodic cube: "
-            << type() << " forces shells of wavenumbers of a cube"
+            << type() << " forces a periodic cube: " << why.c_str()
             << exit(FatalError);
     }
 
     // of the finest waves that the spectral solver keeps
-    const scalar n = std::cbrt(scalar(returnReduce(mesh_.nCells(), sumOp<label>())));
+    const label cells = returnReduce(mesh_.nCells(), sumOp<label>());
+    const scalar n = std::cbrt(scalar(cells));
     const label limit = label((n + 1e-6 - 1)/3);
 
     if (cutoff > limit)

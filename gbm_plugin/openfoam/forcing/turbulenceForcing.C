@@ -181,7 +181,7 @@ void Foam::fv::turbulenceForcing::writeRow
 )
 {
     const scalar uPrime = Foam::sqrt(2*s.k/3);
-    const scalar epsilon = max(s.epsilonLaplacian, VSMALL);
+    const scalar epsilon = max(s.epsilonLaplacian, VSMALL);     // at rest
 
     // over the step that ends here; at a start no step has ended
     const scalar epsilonBudget =
@@ -198,8 +198,8 @@ void Foam::fv::turbulenceForcing::writeRow
             << token::TAB << s.epsilonGradient
             << token::TAB << s.epsilonLaplacian
             << token::TAB << uPrime
-            << token::TAB << Foam::sqrt(15/(nu_*epsilon))*sqr(uPrime)
-            << token::TAB << Foam::pow025(pow3(nu_)/epsilon)
+            << token::TAB << sqr(uPrime)*Foam::sqrt(15/nu_)/Foam::sqrt(epsilon)
+            << token::TAB << Foam::pow(nu_, 0.75)/Foam::pow025(epsilon)
             << token::TAB << power/(2*max(s.k, VSMALL))
             << token::TAB << power
             << token::TAB << s.mean.x()

@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...case.layout import FLOW, FLOW_TABLE, as_time
+from ...case.layout import as_time
 from ...case.layout import results as results_of
 from ...output.field import read_velocity
 from ...output.recording import open_recording
-from ...output.tables import read_dat
+from ...output.tables import read_forcing
 from ...statistics import series
 from ...statistics.fibers import end_to_end_squared_ratio, mean_curvature
 from ...statistics.turbulence import differenced_dissipation, energy_spectrum, field_statistics
 
 BLOCKS = 10  # of a curve's error; each must be longer than the correlation time
-TABLE = {  # of linearForcing.dat
+TABLE = {  # of the forcing
     "k": "k",
     "u'": "uPrime",
     "Re_lambda": "ReLambda",
@@ -59,7 +59,7 @@ class Averages:
 def averages(results: Path, cells: int, box: float, viscosity: float, since: float, highest: int) -> Averages:
     """Averages over all that is later than `since` [s]; spectra up to `highest` waves per box. Raises
     ValueError where that is too short for an error."""
-    table = read_dat(results_of(results, FLOW), FLOW_TABLE)
+    table = read_forcing(results)
     late = table["Time"] > since
     numbers = {name: _mean(table[column][late]) for name, column in TABLE.items()}
     lost = _mean((table["epsilonBudget"] - table["epsilonLaplacian"])[late])

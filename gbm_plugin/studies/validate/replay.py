@@ -19,12 +19,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.copies import copy_case
-from ...case.layout import FLOW, FLOW_TABLE, results
+from ...case.layout import results
 from ...case.scene import read_scene
 from ...errors import RunError
 from ...flow.stored import POINTS_IN_TIME
 from ...output.recording import open_recording
-from ...output.tables import read_dat
+from ...output.tables import read_forcing
 from ...run.openfoam import STOPPED
 from ...run.openfoam import run as run_openfoam
 from ...run.stored import run_stored
@@ -114,7 +114,8 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
         copy_case(case, copy, entries, {"constant/fiberProperties": fibers})
         if copy == live:
             name = f"{start:.8g}"
-            for part in ("U", "p", "phi", "U_0", "uniform/time", "uniform/linearForcing"):
+            forcing = f"uniform/{read_scene(live).forcing.name}"
+            for part in ("U", "p", "phi", "U_0", "uniform/time", forcing):
                 target = live / name / part
                 target.parent.mkdir(parents=True, exist_ok=True)
                 if (before / name / part).is_file():
@@ -124,7 +125,7 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
 
 
 def _kolmogorov_time(live: Path) -> float:
-    table = read_dat(results(live, FLOW), FLOW_TABLE)
+    table = read_forcing(live)
     return float(np.sqrt(read_scene(live).kinematic_viscosity / np.mean(table["epsilonBudget"])))
 
 
