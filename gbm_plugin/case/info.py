@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict
 
+from ..scales import kolmogorov_length
 from .scene import Family, Scene
 
 # beyond these a bead is no longer a passive point of the flow around it
@@ -34,7 +35,7 @@ def figures(scene: Scene) -> dict:
 
 
 def _kolmogorov(scene: Scene, dissipation: float | None) -> float | None:
-    return (scene.kinematic_viscosity**3 / dissipation) ** 0.25 if dissipation else None
+    return kolmogorov_length(scene.kinematic_viscosity, dissipation) if dissipation else None
 
 
 def _family(f: Family, scene: Scene, dissipation: float | None) -> dict:

@@ -14,6 +14,7 @@ from ..files import replaced, write_text
 from ..output.field import box_mesh, latest_time, read_velocity, vorticity_magnitude
 from ..output.recording import Recording, open_recording
 from ..output.tables import read_forcing
+from ..scales import kolmogorov_length
 from ..statistics import fibers as shape
 from ..statistics.turbulence import energy_spectrum
 from .figures import end_to_end_figure, energy_figure, spectrum_figure
@@ -148,7 +149,7 @@ def _scales(time: float, k: NDArray, spectrum: NDArray, table: dict | None, reco
         nu = recording.metadata["dynamic_viscosity"] / recording.metadata["density"]
         epsilon = float(2 * nu * (k[1] - k[0]) * (k**2 * spectrum).sum())
         if epsilon > 0:
-            return epsilon, (nu**3 / epsilon) ** 0.25, "2 nu sum k^2 E"
+            return epsilon, kolmogorov_length(nu, epsilon), "2 nu sum k^2 E"
     return None, None, None
 
 

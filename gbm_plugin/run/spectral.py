@@ -19,6 +19,7 @@ from ..case.times import choose_start
 from ..errors import CaseError
 from ..files import created, replaced
 from ..output.restarts import keep_earlier
+from ..scales import kolmogorov_length, taylor_reynolds
 from ..spectral import EswaranPope, LinearForcing, SpectralSolver
 from ..spectral.interpolation import WORDS
 from .driver import Carrier, Run, results_folder
@@ -125,8 +126,8 @@ class _SpectralFlow(Carrier):
         if self.before is not None:
             balance = 0.5 * (power + self.before[1]) - (energy - self.before[0]) / self.scene.time_step
         nu, u = self.scene.kinematic_viscosity, math.sqrt(2 * energy / 3)
-        reynolds = u**2 * math.sqrt(15 / (nu * dissipation)) if dissipation > 0 else 0.0
-        eta = (nu**3 / dissipation) ** 0.25 if dissipation > 0 else math.inf
+        reynolds = taylor_reynolds(u, nu, dissipation)
+        eta = kolmogorov_length(nu, dissipation)
         coefficient = power / (2 * energy) if energy > 0 else 0.0
         mean = self.solver.coefficients[:, 0, 0, 0].real
         row = (time, energy, balance, dissipation, dissipation, u, reynolds, eta, coefficient, power, *mean)

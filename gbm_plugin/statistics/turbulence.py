@@ -8,6 +8,8 @@ follows from it) excludes it.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..scales import kolmogorov_length, kolmogorov_time
+
 Box = float | tuple[float, float, float]
 CHUNK = 1 << 16  # values handled at once: temporaries stay in the cache
 
@@ -89,8 +91,8 @@ def scales(k: NDArray, spectrum: NDArray, dissipation: float, viscosity: float) 
             "enstrophy": dissipation / np.float64(2 * viscosity),
             "taylor_length": taylor,
             "taylor_reynolds": rms * taylor / np.float64(viscosity),
-            "kolmogorov_length": (viscosity**3 / np.float64(dissipation)) ** 0.25,
-            "kolmogorov_time": np.sqrt(viscosity / np.float64(dissipation)),
+            "kolmogorov_length": kolmogorov_length(viscosity, dissipation),
+            "kolmogorov_time": kolmogorov_time(viscosity, dissipation),
             "integral_length": integral,
             "dissipation_length": rms**3 / np.float64(dissipation),
             "turnover_time": integral / rms,

@@ -28,6 +28,7 @@ from ...output.tables import read_forcing
 from ...run.openfoam import STOPPED
 from ...run.openfoam import run as run_openfoam
 from ...run.stored import run_stored
+from ...scales import kolmogorov_time
 from ..figures import replay_figure
 from ..study import option
 
@@ -126,7 +127,7 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
 
 def _kolmogorov_time(live: Path) -> float:
     table = read_forcing(live)
-    return float(np.sqrt(read_scene(live).kinematic_viscosity / np.mean(table["epsilonBudget"])))
+    return kolmogorov_time(read_scene(live).kinematic_viscosity, float(np.mean(table["epsilonBudget"])))
 
 
 def _distances(live: Path, in_time: str, every: int) -> dict[str, float]:
