@@ -13,6 +13,7 @@ from .layout import fiber_state, processors, time_folders, velocity_file
 from .openfoam import utility
 from .scene import Scene
 from .times import Start, move_aside
+from .trust import refuse_links_out
 
 
 def prepare(scene: Scene, start: Start, ranks: int) -> None:
@@ -20,6 +21,7 @@ def prepare(scene: Scene, start: Start, ranks: int) -> None:
     case = scene.case
     if not start.continues:
         if _mesh_time(case) < _newest(case / "system/blockMeshDict"):
+            refuse_links_out(case, case / "constant/polyMesh")
             utility(case, "blockMesh")
         initial_fields(scene)
     if not _mesh_time(case):

@@ -12,6 +12,7 @@ from ..errors import CaseError
 from .dictionary import Dictionary
 from .positions import read_positions
 from .share import Share
+from .trust import is_inside
 
 INTEGRATORS = ("ab3", "implicit", "auto")
 MOBILITIES = ("freeDrain", "rpy")
@@ -351,4 +352,8 @@ def _texts(case: Path) -> dict[str, str]:
         "system/blockMeshDict",
         "system/initialFieldDict",
     )
-    return {n: (case / n).read_text(errors="replace") for n in names if (case / n).is_file()}
+    return {
+        n: (case / n).read_text(errors="replace") if is_inside(case, case / n) else "(a link out of the case)"
+        for n in names
+        if (case / n).is_file()
+    }

@@ -22,6 +22,7 @@ from ..case.layout import fiber_state, find_state, log_file, results, states
 from ..case.lock import DAEMON, locked
 from ..case.scene import Scene, read_scene
 from ..case.share import Share
+from ..case.trust import check_case
 from ..errors import CaseError, CouplingError, StateError
 from ..fleet.fleet import Fleet, prepare_kernels
 from ..fleet.journal import Journal
@@ -56,6 +57,7 @@ def serve(case: Path | str, number: int | None = None) -> None:
     """
     case = Path(case).resolve()
     scene = read_scene(case)
+    check_case(case)
     share = _share(scene, number)
     scene = scene.part(share)
     stop = _StopFlag()

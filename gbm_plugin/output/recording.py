@@ -19,6 +19,7 @@ from .restarts import kept
 from .transaction import Transaction
 
 ATTEMPTS, PAUSE = 4, 0.02  # to open a file that a run is adding to [s]
+SMALL, DENSITY = 64 << 20, 100  # a dataset may have so many bytes, or so many times those of its file
 
 __all__ = ["FamilyRecord", "Positions", "RecordedFamily", "Recorder", "Recording", "open_recording"]
 
@@ -46,7 +47,7 @@ class Positions:
         rows, rest = np.arange(len(self))[key[0]] if key else np.arange(len(self)), key[1:]
         if np.ndim(rows) == 0:
             part = int(np.searchsorted(self._starts, rows, side="right")) - 1
-            return self._parts[part][0][(int(rows - self._starts[part]), *rest)]
+            return _finite(self._parts[part][0][(int(rows - self._starts[part]), *rest)])
         runs = np.split(rows, np.flatnonzero(np.diff(rows) != 1) + 1) if len(rows) else []
         pieces = [
             dataset[(slice(max(run[0] - start, 0), min(run[-1] + 1 - start, count)), *rest)]
@@ -55,10 +56,17 @@ class Positions:
             if run[0] < start + count and run[-1] >= start
         ]
         empty = np.empty((0, *np.empty((1, *self.shape[1:]))[(slice(None), *rest)].shape[1:]))
-        return np.concatenate(pieces) if pieces else empty
+        return _finite(np.concatenate(pieces)) if pieces else empty
 
     def __array__(self, dtype=None, copy=None) -> NDArray[np.float64]:
         return np.asarray(self[:], dtype=dtype)
+
+
+def _finite(positions: NDArray) -> NDArray:
+    """The recorder writes no others."""
+    if not np.isfinite(positions).all():
+        raise ValueError("a recording holds positions that are not finite: it was damaged")
+    return positions
 
 
 @dataclass(frozen=True)
@@ -83,9 +91,9 @@ class Recording:
         self.paths = [path for part in parts for path in part.paths]
         self.times = np.concatenate([part.times[:count] for part, count in zip(parts, counts, strict=True)])
         self.steps = np.concatenate([part.steps[:count] for part, count in zip(parts, counts, strict=True)])
-        self.box_origin = last.files[0].file["box_origin"][()]
-        self.box_size = last.files[0].file["box_size"][()]
-        self.metadata = last.files[0].metadata()
+        self.box_origin = last.files[0].box_origin
+        self.box_size = last.files[0].box_size
+        self.metadata = last.files[0].metadata
         self.families = {
             name: RecordedFamily(
                 **vars(record),
@@ -166,51 +174,80 @@ class _Joined:
 
 
 class _File:
-    """One open file."""
+    """One open file, whose layout was checked (docs/files.md)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         for attempt in range(1, ATTEMPTS + 1):
             self._changes = Transaction(path, writable=False)
+            self.file: h5py.File | None = None
             try:
                 # a file that was left in the middle of a change is read through its journal
                 self.file = h5py.File(self._changes if self._changes.recovered else path, "r")
-                break
-            except OSError as error:  # perhaps a run has changed it while it was opened
-                self._changes.close()
+                self._read()
+                return
+            except UnknownVersion:
+                self.close()
+                raise
+            except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+                self.close()  # perhaps a run has changed it while it was opened
                 if attempt == ATTEMPTS:
                     raise ValueError(f"{path} is not a fiber recording: {error}") from None
                 time.sleep(PAUSE)
+
+    def _read(self) -> None:
         version = self.file.attrs.get("schema_version")
         if version != SCHEMA_VERSION:
-            self.close()
-            raise ValueError(f"{path} has schema_version {version}; this program reads {SCHEMA_VERSION}")
-        self.times = self.file["time"][()]
-        self.steps = self.file["step"][()]
-        groups = sorted(self.file["families"].items(), key=lambda item: item[1].attrs["number"])
-        self.families = {name: self._family(name, group) for name, group in groups}
+            raise UnknownVersion(
+                f"{self.path} has schema_version {version}; this program reads {SCHEMA_VERSION}"
+            )
+        most = max(SMALL, DENSITY * self.path.stat().st_size)  # what it may hold, compressed or not [bytes]
+        self.times = _numbers(self.file, "time", 1, most)
+        self.steps = _numbers(self.file, "step", 1, most)
+        if len(self.steps) != len(self.times) or (np.diff(self.times) <= 0).any():
+            raise ValueError(f"{len(self.times)} times that do not increase, or not {len(self.steps)}")
+        self.box_origin, self.box_size = (
+            _numbers(self.file, name, 1, most) for name in ("box_origin", "box_size")
+        )
+        if self.box_origin.shape != (3,) or self.box_size.shape != (3,) or not (self.box_size > 0).all():
+            raise ValueError(f"the box {self.box_origin}, {self.box_size} is none")
+        groups = _children(self.file, "families")
+        if not groups:
+            raise ValueError("it has no families")
+        groups = sorted(groups.items(), key=lambda item: int(item[1].attrs["number"]))
+        self.families = {name: self._family(name, group, most) for name, group in groups}
+        self.metadata = self._metadata(most)
 
-    @staticmethod
-    def _family(name: str, group: h5py.Group) -> FamilyRecord:
-        _, count, beads, _ = group["positions"].shape
+    def _family(self, name: str, group: h5py.Group, most: int) -> FamilyRecord:
+        positions = _dataset(group, "positions", 4, most)
+        _, count, beads, _ = positions.shape
+        if positions.shape[::3] != (len(self.times), 3):
+            raise ValueError(
+                f"family {name} has positions of shape {positions.shape} at {len(self.times)} times"
+            )
         seed = group.attrs["seed"]
-        stiffness = group["bending_stiffness"][()]
+        stiffness = _numbers(group, "bending_stiffness", None, most)
+        model = dict(_child(group, "model", h5py.Group).attrs)
+        if not all(isinstance(word, str) for word in model.values()):
+            raise ValueError(f"family {name} has a model that is not in words")
         return FamilyRecord(
             name,
             count,
             beads,
-            float(group["radius"][()]),
+            float(_numbers(group, "radius", 0, most)),
             float(stiffness) if np.ndim(stiffness) == 0 else stiffness,
             None if isinstance(seed, h5py.Empty) else int(seed),
-            dict(group["model"].attrs),
+            model,
         )
 
-    def metadata(self) -> dict:
+    def _metadata(self, most: int) -> dict:
         values = dict(self.file.attrs)
         values["schema_version"] = int(values["schema_version"])
         # attributes of Recording, and the names in the file
         for name, dataset in (("dynamic_viscosity", "viscosity"), ("density", "density")):
-            values[name] = float(self.file[dataset][()])
+            values[name] = float(_numbers(self.file, dataset, 0, most))
+            if not values[name] > 0:
+                raise ValueError(f"{dataset} is {values[name]}")
         texts = {}
 
         def collect(name: str, node) -> None:
@@ -218,13 +255,52 @@ class _File:
                 texts[name] = node.asstr()[()]
 
         if "dictionaries" in self.file:
-            self.file["dictionaries"].visititems(collect)
+            _child(self.file, "dictionaries", h5py.Group).visititems(collect)
         values["dictionaries"] = texts
         return values
 
     def close(self) -> None:
-        self.file.close()
+        if self.file is not None:
+            self.file.close()
         self._changes.close()
+
+
+class UnknownVersion(ValueError):
+    """A recording of another program version."""
+
+
+def _child(group: h5py.Group, name: str, kind: type):
+    """What a group itself holds under a name: not by a link to elsewhere, in this file or in another."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"'{name}' is not in it")
+    node = group[name]
+    if not isinstance(node, kind):
+        raise ValueError(f"'{name}' is no {kind.__name__.lower()}")
+    return node
+
+
+def _children(group: h5py.Group, name: str) -> dict[str, h5py.Group]:
+    inner = _child(group, name, h5py.Group)
+    return {child: _child(inner, child, h5py.Group) for child in inner}
+
+
+def _dataset(group: h5py.Group, name: str, dimensions: int | None, most: int) -> h5py.Dataset:
+    """A dataset of numbers whose values are in this file, and which is not larger than the file can hold."""
+    found = _child(group, name, h5py.Dataset)
+    if found.dtype.kind not in "fiu" or found.is_virtual or found.external:
+        raise ValueError(f"'{name}' holds no numbers of its own")
+    if found.shape is None or (dimensions is not None and found.ndim != dimensions):
+        raise ValueError(f"'{name}' has shape {found.shape}")
+    if found.nbytes > most:
+        raise ValueError(f"'{name}' has shape {found.shape}, which is more than the file holds")
+    return found
+
+
+def _numbers(group: h5py.Group, name: str, dimensions: int | None, most: int) -> NDArray:
+    values = _dataset(group, name, dimensions, most)[()]
+    if not np.isfinite(values).all():
+        raise ValueError(f"'{name}' is not finite")
+    return values
 
 
 def _by_start(folder: Path) -> list[list[Path]]:

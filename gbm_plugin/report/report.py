@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.layout import results
+from ..case.trust import check_case
 from ..files import replaced, write_text
 from ..output.field import box_mesh, latest_time, read_velocity, vorticity_magnitude
 from ..output.recording import Recording, open_recording
@@ -46,6 +47,7 @@ def report(case_dir: Path | str) -> dict:
     case = Path(case_dir)
     if not case.is_dir():
         raise FileNotFoundError(f"no case at {case}")
+    check_case(case)
     key: dict = {"case": case.resolve().name, "flow": None, "spectrum": None, "fibers": None}
     key.update(files=[], not_drawn=[])
     folder = case / "report"

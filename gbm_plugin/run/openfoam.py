@@ -21,6 +21,7 @@ from ..case.prepare import prepare, ranks_of, reconstruct
 from ..case.scene import Scene, read_scene
 from ..case.share import Share, all_shares
 from ..case.times import choose_start
+from ..case.trust import check_case
 from ..errors import RunError
 from ..files import created
 from ..output.restarts import keep_earlier
@@ -80,6 +81,7 @@ def _run_here(case: Path | str, engine: Callable[..., bool], options: dict) -> N
 def _only_run(case: Path) -> Iterator[int]:
     """Two runs never write into one case, nor one beside a daemon that was started by hand. Yields the lock,
     which solver and daemon hold too: should this process be killed, the next run is refused until they have ended."""
+    check_case(case)
     with locked(case, RUN) as lock:
         for file in case.glob(f".gbm.{DAEMON}*.lock"):
             with locked(case, file.name.removeprefix(".gbm.").removesuffix(".lock")):
