@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..case.layout import FIBERS, FLOW, FLOW_TABLE, results
-from ..output.tables import read_dat
+from ..case.layout import FIBERS, results
+from ..output.tables import read_dat, read_forcing
 from ..statistics.series import mean
 
 FLOW_ROWS = {  # column: name, unit
@@ -24,7 +24,7 @@ def summary(case: Path | str, cell: float | None = None) -> list[str]:
     """Averages over the second half of a run, with standard errors that know correlation in time; empty where
     nothing is there. cell: the cells' width [m], for Δx/η."""
     lines: list[str] = []
-    flow = _table(results(case, FLOW), FLOW_TABLE)
+    flow = _table(read_forcing, case)
     if flow:
         lines += [_row(f"{n} [{u}]" if u else n, flow, c) for c, (n, u) in FLOW_ROWS.items() if c in flow]
         if cell and "eta" in flow:
@@ -40,9 +40,9 @@ def summary(case: Path | str, cell: float | None = None) -> list[str]:
     return [f"averages from t = {start:g} to {end:g} s, ± standard error{note}", *lines]
 
 
-def _table(folder: Path, name: str) -> dict[str, NDArray]:
+def _table(read: Callable, *where) -> dict[str, NDArray]:
     try:
-        table = read_dat(folder, name)
+        table = read(*where)
     except (FileNotFoundError, ValueError):
         return {}
     return table if len(table.get("Time", ())) > 1 else {}
@@ -52,7 +52,7 @@ def _ratios(case: Path) -> dict[str, NDArray]:
     """Time and <R^2>/L^2 of each family, averaged over the daemons that shared it."""
     folder = results(case, FIBERS)
     names = sorted({p.name for p in folder.glob("*/daemon*.dat")})
-    tables = [t for t in (_table(folder, name) for name in names) if t]
+    tables = [t for t in (_table(read_dat, folder, name) for name in names) if t]
     if not tables:
         return {}
     newest = max(tables, key=lambda t: t["Time"][-1])
