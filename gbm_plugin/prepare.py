@@ -8,7 +8,7 @@ import numpy as np
 
 from .fiber import Fibers, instant_rates
 from .fiber import prepare as prepare_fibers
-from .fiber.mobility import MOBILITIES
+from .fiber.model import MOBILITIES
 from .flow import grid
 from .spectral import LinearForcing, SpectralSolver
 from .spectral.interpolation import WORDS
@@ -17,8 +17,8 @@ from .spectral.interpolation import WORDS
 def prepare() -> None:
     """Small runs with every word."""
     for integrator, mobility in itertools.product(("ab3", "implicit"), MOBILITIES):
-        prepare_fibers(integrator, mobility)
-    prepare_fibers("ab3", "rpy", strain_coupling=True, repulsion=1.0)
+        prepare_fibers(integrator=integrator, mobility=mobility)
+    prepare_fibers(mobility="rpy", strain_coupling=True, repulsion=1.0)
     fibers = Fibers.straight(1, 3, 1.0, 1.0, 1.0)
     for mobility in MOBILITIES:
         instant_rates(fibers, 0.0, 0.0, mobility)

@@ -27,7 +27,7 @@ EVERY_WORD = """
 import itertools
 import numpy as np
 from gbm_plugin import Fibers, simulate
-from gbm_plugin.case.scene import BENDING_TORQUES, CURVATURE_LAWS, INTEGRATORS, MOBILITIES
+from gbm_plugin.fiber.model import BENDING_TORQUES, CURVATURE_LAWS, INTEGRATORS, MOBILITIES
 from gbm_plugin.fiber import Stepper
 from gbm_plugin.flow import LinearFlow, StoredFlow, TaylorGreen
 from gbm_plugin.flow.grid import WORDS

@@ -82,8 +82,9 @@ def peaked_spectrum(kinetic_energy: float, peak: float, highest: int) -> dict[in
     return dict(zip(k.tolist(), (kinetic_energy * e / e.sum()).tolist(), strict=True))
 
 
-def taylor_green(velocity: float) -> FourierModes:
-    """(sin x cos y cos z, -cos x sin y cos z, 0) times velocity, x in units of box/2 pi."""
+def taylor_green_vortex(velocity: float) -> FourierModes:
+    """The decaying three-dimensional vortex, not the cells of flow.TaylorGreen: (sin x cos y cos z, -cos x sin y cos z,
+    0) times velocity, x in units of box/2 pi."""
     signs = np.array([(1, s, t) for s in (1, -1) for t in (1, -1)])
     # sin x cos y cos z = Re sum over s, t of -i/4 e^{i(x + s y + t z)}; the second term with -s
     a = np.zeros((4, 3), dtype=complex)

@@ -10,11 +10,11 @@ import numpy as np
 from ..errors import CaseError
 from ..files import replaced
 from .dictionary import Dictionary
-from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
+from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green_vortex
 
 END = f"// {73 * '*'} //"  # the last line of what OpenFOAM writes: the file is whole
 NOTE = "made from system/initialFieldDict"
-KINDS = ("random", "modes", "taylorGreen", "ABC")
+KINDS = ("random", "modes", "taylorGreenVortex", "ABC")
 
 
 def read_initial_field(case: Path) -> FourierModes:
@@ -24,8 +24,8 @@ def read_initial_field(case: Path) -> FourierModes:
     try:
         if kind == "random":
             modes = _random(d)
-        elif kind == "taylorGreen":
-            modes = taylor_green(d.number("velocity", 1.0))
+        elif kind == "taylorGreenVortex":
+            modes = taylor_green_vortex(d.number("velocity", 1.0))
         elif kind == "ABC":
             modes = abc(d.number("A", 1.0), d.number("B", 1.0), d.number("C", 1.0))
         else:

@@ -83,7 +83,7 @@ PRESETS = {
             "system/controlDict": {"deltaT": 0.02, "endTime": 10},
         },
         {
-            "system/initialFieldDict": "field           taylorGreen;\nvelocity        1;              // [m/s]\n"
+            "system/initialFieldDict": "field           taylorGreenVortex;\nvelocity        1;              // [m/s]\n"
         },
         ("constant/fvOptions",),
     ),

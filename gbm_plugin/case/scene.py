@@ -3,36 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import CaseError
+from ..fiber.model import Model, ModelError, entry_name
 from .dictionary import Dictionary
 from .positions import read_positions
 from .share import Share
 from .trust import is_inside
 
-INTEGRATORS = ("ab3", "implicit", "auto")
-MOBILITIES = ("freeDrain", "rpy")
-BENDING_TORQUES = ("consistent", "asPrinted")
-CURVATURE_LAWS = ("sine", "discreteRod")
 TRANSPORTS = ("socket", "tcp", "file")
 SHAPES = ("straight", "file")
-
-
-@dataclass(frozen=True)
-class Model:
-    """How fibers are computed: the words of constant/fiberProperties, which a family may override."""
-
-    integrator: str = "ab3"
-    mobility: str = "freeDrain"
-    bending_torque: str = "consistent"
-    curvature_law: str = "sine"
-    strain_coupling: bool = False
-    tolerance: float | None = None
-    repulsion: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -181,21 +165,22 @@ def _write_interval(control: Dictionary, time_step: float) -> float:
 
 
 def _read_model(d: Dictionary, default: Model) -> Model:
-    model = replace(
-        default,
-        integrator=d.word("integrator", INTEGRATORS, default.integrator),
-        mobility=d.word("mobility", MOBILITIES, default.mobility),
-        bending_torque=d.word("bendingTorque", BENDING_TORQUES, default.bending_torque),
-        curvature_law=d.word("curvatureLaw", CURVATURE_LAWS, default.curvature_law),
-        strain_coupling=d.switch("strainCoupling", default.strain_coupling),
-        tolerance=d.number("tolerance", default.tolerance, above=0),
-        repulsion=d.number("repulsion", default.repulsion, least=0),
-    )
-    if model.strain_coupling and model.mobility == "freeDrain":
-        raise d.fail("strainCoupling", "is yes with mobility freeDrain, where it is nothing; it needs rpy")
-    if model.tolerance is not None and model.integrator == "ab3":
-        raise d.fail("tolerance", "goes with integrator implicit or auto; ab3 takes its step from eq. (10)")
-    return model
+    """Every option of the model, as an entry of its name."""
+    chosen = {}
+    for option in fields(Model):
+        entry, value = entry_name(option.name), getattr(default, option.name)
+        if allowed := option.metadata.get("allowed"):
+            chosen[option.name] = d.word(entry, allowed, value)
+        elif isinstance(option.default, bool):
+            chosen[option.name] = d.switch(entry, value)
+        elif option.metadata["least"] == "positive":
+            chosen[option.name] = d.number(entry, value, above=0)
+        else:
+            chosen[option.name] = d.number(entry, value, least=0)
+    try:
+        return Model(**chosen)
+    except ModelError as error:
+        raise d.fail(entry_name(error.option), error.wrong) from None
 
 
 def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:

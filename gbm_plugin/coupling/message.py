@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.share import Share
-from ..flow import NEEDS
+from ..sampling import NEEDS
 
 MAGIC = b"GBMC"
 VERSION = 2

@@ -5,22 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import kernel
+from ..sampling import lagrange_weights
 from .layout import pack, unpack
 from .simd import LANES
 from .threads import COPYING, in_shares
 
 SAMPLES = 3  # in the polynomial in time
 KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction
-
-
-def lagrange_weights(times, time: float) -> np.ndarray:
-    """Weights of values at the given times in their interpolating polynomial at one time."""
-    times = np.asarray(times, dtype=float)
-    weights = np.ones(len(times))
-    for j, own in enumerate(times):
-        for other in np.delete(times, j):
-            weights[j] *= (time - other) / (own - other)
-    return weights
 
 
 @kernel

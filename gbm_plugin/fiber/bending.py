@@ -12,7 +12,6 @@ import numpy as np
 from ..compiled import inlined
 from .simd import arithmetic, cross, dot, larger, scale
 
-CURVATURE_LAWS = ("sine", "discreteRod")
 TORQUES = {"consistent": 0.5, "asPrinted": 1.0}
 FOLD = 1e-12  # smallest 1 + cos θ: keeps the moment of a folded discrete rod finite
 

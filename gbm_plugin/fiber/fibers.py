@@ -6,17 +6,11 @@ from copy import copy
 
 import numpy as np
 
-from .bending import CURVATURE_LAWS, TORQUES, bending_energy
+from .bending import bending_energy
 from .contact import self_contacts
+from .model import FiberOptions
 
 TOUCHING = 1e-6  # largest relative difference of a bead spacing from 2a
-
-
-def one_of(name: str, value: str, allowed) -> str:
-    """value, if it is one of the allowed words; else ValueError."""
-    if value not in allowed:
-        raise ValueError(f"{name} is {value!r}; allowed are {', '.join(allowed)}")
-    return value
 
 
 def finite_array(name: str, value, shape_text: str, dimensions: int) -> np.ndarray:
@@ -70,8 +64,8 @@ class Fibers:
             )
         self.radius = diameter / 2
         self.viscosity = positive("viscosity", viscosity)
-        self.bending_torque = one_of("bending_torque", bending_torque, TORQUES)
-        self.curvature_law = one_of("curvature_law", curvature_law, CURVATURE_LAWS)
+        material = FiberOptions(bending_torque, curvature_law)
+        self.bending_torque, self.curvature_law = material.bending_torque, material.curvature_law
         self.centres = beads.mean(axis=1)
         self.links = bonds / spacing[..., None]
         self.bending_stiffness = self._stiffness(bending_stiffness, young_modulus)

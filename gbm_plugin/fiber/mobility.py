@@ -3,7 +3,6 @@
 from . import free_drain, implicit_drain, rpy
 from .blocks import rows_of
 
-MOBILITIES = ("freeDrain", "rpy")
 _LAYOUTS = {
     "freeDrain": (free_drain.layout, implicit_drain.layout),
     "rpy": (rpy.layout, rpy.stage_layout),

@@ -6,11 +6,12 @@ import numpy as np
 
 from ..compiled import kernel, woven
 from . import free_drain, rpy
-from .bending import CURVATURE_LAWS, velocity_scale
+from .bending import velocity_scale
 from .blocks import Chain, Flow, Material, Motion
-from .fibers import Fibers, one_of
+from .fibers import Fibers
 from .layout import pack, unpack
-from .mobility import MOBILITIES, work_rows
+from .mobility import work_rows
+from .model import CURVATURE_LAWS, MotionOptions
 from .simd import load
 
 
@@ -43,7 +44,7 @@ def instant_rates(fibers: Fibers, velocity, rotation, mobility="freeDrain"):
     velocity, rotation: ambient, at the beads (F, N, 3). The force of link i acts on bead i, its opposite on
     bead i + 1; its part along the link is the tension.
     """
-    evaluate = _EVALUATE[one_of("mobility", mobility, MOBILITIES)]
+    evaluate = _EVALUATE[MotionOptions(mobility=mobility).mobility]
     state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
     rates, multipliers = np.zeros_like(state), np.zeros((len(state), state.shape[1] - 3, state.shape[2]))
     work = np.zeros((work_rows(mobility, fibers.beads, implicit=False), state.shape[2]))

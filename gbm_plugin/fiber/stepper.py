@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from ..sampling import lagrange_weights
 from . import ab3, implicit
-from .ambient import SAMPLES, Ambient, lagrange_weights
+from .ambient import SAMPLES, Ambient
 from .blocks import Samples
 from .contact import repulsion_velocity
-from .fibers import Fibers, one_of, positive
+from .fibers import Fibers, positive
 from .layout import bead_positions, pack, unpack
-from .mobility import MOBILITIES
+from .model import MotionOptions
 from .rates import material
 from .simd import LANES
 from .strain import with_strain
 from .threads import COPYING, available, in_shares
 
-INTEGRATORS = ("ab3", "implicit", "auto")
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
@@ -28,12 +29,11 @@ SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open wit
 class Stepper:
     """Time stepping of one family, fed with one sample of the flow at the beads per step.
 
-    integrator: "ab3" (third order, sub-steps within eq. 10), "implicit" (second order, any step) or "auto"
-    (ab3 where eq. 10 allows the whole step and the error estimate too, else implicit, fiber by fiber).
+    options: of model.MotionOptions. integrator "ab3": third order, sub-steps within eq. (10); "implicit": second, any
+    step; "auto": ab3 where eq. (10) allows the whole step and the error estimate too, else implicit, fiber by fiber.
     tolerance (for implicit and auto; None: 1e-3): bead displacement over fiber length. Every accepted step of
     every fiber is held to a tenth of it, in the rms rotation of its links, so that a relaxation of several
-    steps stays within. repulsion: rate (1/time) at which overlaps of beads that are not neighbours decay;
-    below about 1/time_step.
+    steps stays within. repulsion: below about 1/time_step.
 
     need says what observe() takes beside the velocity. The loop of a run:
 
@@ -43,26 +43,15 @@ class Stepper:
                     stepper.observe(time + dt, …)
     """
 
-    def __init__(
-        self,
-        fibers: Fibers,
-        time=0.0,
-        integrator="ab3",
-        mobility="freeDrain",
-        strain_coupling=False,
-        tolerance=None,
-        repulsion=0.0,
-    ):
+    def __init__(self, fibers: Fibers, time: float = 0.0, *words: Any, **options: Any):
+        """words, options: those of model.MotionOptions, in its order or by name."""
         self.fibers = fibers
         self._beads = fibers.count * fibers.beads
-        self.integrator = one_of("integrator", integrator, INTEGRATORS)
-        self.mobility = one_of("mobility", mobility, MOBILITIES)
-        if strain_coupling and mobility == "freeDrain":
-            raise ValueError("strain_coupling with mobility freeDrain has no effect; it needs rpy")
-        self.need = "gradient" if strain_coupling else "rotation"
-        self.tolerance = positive("tolerance", TOLERANCE if tolerance is None else tolerance)
+        motion = MotionOptions(*words, **options)
+        self.integrator, self.mobility, self.repulsion = motion.integrator, motion.mobility, motion.repulsion
+        self.need = "gradient" if motion.strain_coupling else "rotation"
+        self.tolerance = TOLERANCE if motion.tolerance is None else motion.tolerance
         self.local_tolerance = SHARE * self.tolerance
-        self.repulsion = positive("repulsion", repulsion, zero=True)
         self.time = float(time)
         self.provisional = False
         self._ambient = Ambient(fibers.count, fibers.beads)

@@ -12,6 +12,7 @@ lengths in a,
 import numpy as np
 
 from ..compiled import kernel, only_read
+from ..sampling import rotation_of
 from .threads import in_shares
 
 
@@ -58,8 +59,9 @@ def with_strain(positions, velocity, gradient, radius):
     gradient: (F, N, 3, 3), [..., i, j] = du_i/dx_j, at the beads.
     """
     transpose = np.swapaxes(gradient, -1, -2)
-    rotation = 0.5 * (transpose - gradient)[..., [1, 2, 0], [2, 0, 1]]
     strain = only_read(0.5 * (gradient + transpose))
-    velocity, rotation = (np.array(field, dtype=float, order="C") for field in (velocity, rotation))
+    velocity, rotation = (
+        np.array(field, dtype=float, order="C") for field in (velocity, rotation_of(gradient))
+    )
     in_shares(_disturb, velocity.size / 3, only_read(positions), strain, radius, velocity, rotation)
     return velocity, rotation

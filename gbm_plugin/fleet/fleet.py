@@ -17,7 +17,7 @@ from ..case.share import WHOLE, Share, all_shares
 from ..errors import CaseError, PredictionError, StateError
 from ..fiber import Fibers, Stepper, merged_states, prepare
 from ..files import replaced
-from ..flow import NEEDS
+from ..sampling import NEEDS, rotation_of
 from ..statistics.fibers import end_to_end_squared_ratio
 
 log = logging.getLogger(__name__)
@@ -28,9 +28,8 @@ GAP_WARNING, GAP_LIMIT = 0.1, 1.0
 
 def prepare_kernels(families: Sequence[Family]) -> None:
     """All that these families will call is compiled when this returns: in a step somebody waits."""
-    models = (f.model for f in families)
-    for words in {(m.integrator, m.mobility, m.strain_coupling, m.repulsion) for m in models}:
-        prepare(*words)
+    for options in {tuple(f.model.motion.items()) for f in families}:
+        prepare(**dict(options))
 
 
 class Fleet:
@@ -58,27 +57,18 @@ class Fleet:
         size = np.subtract(box_max, box_min)
         steppers = []
         for f in scene.families:
-            words = {"bending_torque": f.model.bending_torque, "curvature_law": f.model.curvature_law}
             made_of = (f.bending_stiffness, scene.dynamic_viscosity)
             positions = f.positions
             if positions is None:
                 straight = Fibers.straight(f.total, f.beads, f.length, *made_of, box=size, seed=f.seed)
                 positions = straight.positions + box_min
             try:
-                fibers = Fibers(positions, *made_of, **words).part(slice(f.first, f.first + f.count))
+                fibers = Fibers(positions, *made_of, **f.model.material).part(
+                    slice(f.first, f.first + f.count)
+                )
             except ValueError as error:
                 raise CaseError(f"family {f.name} in constant/fiberProperties: {error}") from None
-            steppers.append(
-                Stepper(
-                    fibers,
-                    time=time,
-                    integrator=f.model.integrator,
-                    mobility=f.model.mobility,
-                    strain_coupling=f.model.strain_coupling,
-                    tolerance=f.model.tolerance,
-                    repulsion=f.model.repulsion,
-                )
-            )
+            steppers.append(Stepper(fibers, time, **f.model.motion))
         return cls(scene.families, steppers, share)
 
     @property
@@ -229,7 +219,5 @@ def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int,
         return None
     extra = extra[part]
     if need == "rotation" and extra.ndim == 3:
-        g = extra
-        curl = (g[:, 2, 1] - g[:, 1, 2], g[:, 0, 2] - g[:, 2, 0], g[:, 1, 0] - g[:, 0, 1])
-        extra = 0.5 * np.stack(curl, axis=-1)
+        extra = rotation_of(extra)
     return extra.reshape(*shape, *extra.shape[1:])

@@ -82,16 +82,5 @@ class Journal:
 
 def _family_record(f: Family) -> FamilyRecord:
     """What the recording says of a family."""
-    model = {
-        "integrator": f.model.integrator,
-        "mobility": f.model.mobility,
-        "bendingTorque": f.model.bending_torque,
-        "curvatureLaw": f.model.curvature_law,
-        "strainCoupling": "yes" if f.model.strain_coupling else "no",
-        "shape": f.shape,
-    }
-    if f.model.tolerance is not None:
-        model["tolerance"] = repr(f.model.tolerance)
-    if f.model.repulsion:
-        model["repulsion"] = repr(f.model.repulsion)
+    model = f.model.entries() | {"shape": f.shape}
     return FamilyRecord(f.name, f.count, f.beads, f.radius, f.bending_stiffness, f.seed, model)

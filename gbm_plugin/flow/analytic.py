@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-NEEDS = ("velocity", "rotation", "gradient")
-
-
-def checked(need: str) -> str:
-    """The word itself; ValueError where it is none of NEEDS."""
-    if need not in NEEDS:
-        raise ValueError(f"need is {need!r}; allowed are {', '.join(NEEDS)}")
-    return need
+from ..sampling import NEEDS, one_of, rotation_of
 
 
 class LinearFlow:
@@ -27,8 +20,7 @@ class LinearFlow:
             )
         if not (np.isfinite(self.gradient).all() and np.isfinite(self.velocity).all()):
             raise ValueError("gradient and velocity of a linear flow must be finite")
-        g = self.gradient
-        self._rotation = 0.5 * np.array([g[2, 1] - g[1, 2], g[0, 2] - g[2, 0], g[1, 0] - g[0, 1]])
+        self._rotation = rotation_of(self.gradient)
 
     def sample(self, positions, time, need="gradient"):
         """Velocity (..., 3) at positions (..., 3), and what need asks for beside it.
@@ -37,7 +29,7 @@ class LinearFlow:
         """
         positions = np.asarray(positions, dtype=float)
         velocity = positions @ self.gradient.T + self.velocity
-        if checked(need) == "velocity":
+        if one_of("need", need, NEEDS) == "velocity":
             return velocity, None
         extra = self._rotation if need == "rotation" else self.gradient
         return velocity, np.broadcast_to(extra, positions.shape[:-1] + extra.shape)
@@ -64,7 +56,7 @@ class TaylorGreen:
         velocity = np.zeros(positions.shape)
         velocity[..., 0] = self.velocity * sin_x * cos_y
         velocity[..., 1] = -self.velocity * cos_x * sin_y
-        if checked(need) == "velocity":
+        if one_of("need", need, NEEDS) == "velocity":
             return velocity, None
         rate = self.velocity * wavenumber
         if need == "rotation":
@@ -101,7 +93,7 @@ class ABC:
         sin_x, sin_y, sin_z = np.moveaxis(np.sin(wavenumber * positions), -1, 0)
         cos_x, cos_y, cos_z = np.moveaxis(np.cos(wavenumber * positions), -1, 0)
         velocity = np.stack([a * sin_z + c * cos_y, b * sin_x + a * cos_z, c * sin_y + b * cos_x], axis=-1)
-        if checked(need) == "velocity":
+        if one_of("need", need, NEEDS) == "velocity":
             return velocity, None
         if need == "rotation":
             return velocity, 0.5 * wavenumber * velocity

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..sampling import NEEDS, lagrange_weights, one_of, rotation_of
 from . import grid
-from .analytic import checked
 
 POINTS_IN_TIME = {"linear": 2, "cubic": 4}
 LOCATIONS = {"nodes": 0.0, "centres": 0.5}  # where the values sit, in cells from a cell's corner
@@ -44,8 +44,8 @@ class StoredFlow:
         self.times = np.array(times, dtype=float)
         self.box, self.origin = (np.array(v, dtype=float) for v in (box, origin))
         self.offset = float(offset)
-        self.interpolation = _one_of("interpolation", interpolation, grid.WORDS)
-        self.in_time = _one_of("interpolation in time", in_time, POINTS_IN_TIME)
+        self.interpolation = one_of("interpolation", interpolation, grid.WORDS)
+        self.in_time = one_of("interpolation in time", in_time, POINTS_IN_TIME)
         self._read = read
         self._fields: dict[int, dict[str, NDArray]] = {}
         self._shape: tuple[int, ...] | None = None
@@ -77,7 +77,7 @@ class StoredFlow:
         du_i/dx_j). ValueError for a time that is not in the stored range or a field of another shape,
         FloatingPointError for a field or position that is not finite.
         """
-        checked(need)
+        one_of("need", need, NEEDS)
         positions = np.asarray(positions, dtype=float)
         if positions.shape[-1:] != (3,):
             raise ValueError(f"positions have shape {positions.shape}; (..., 3) is needed")
@@ -102,8 +102,7 @@ class StoredFlow:
         g = grid.cubic_gradient(self._field(number, "velocity"), points, self.box / self._shape[1:])
         if need == "gradient":
             return g
-        curl = (g[:, 2, 1] - g[:, 1, 2], g[:, 0, 2] - g[:, 2, 0], g[:, 1, 0] - g[:, 0, 1])
-        return 0.5 * np.stack(curl, axis=-1)
+        return rotation_of(g)
 
     def _stencil(self, time: float) -> tuple[list[int], list[float]]:
         """Which fields make that of a time, and their weights. Forgets the fields that are far from it."""
@@ -122,12 +121,7 @@ class StoredFlow:
         self._fields = {n: fields for n, fields in self._fields.items() if n in window}
         if at_field:
             return [near], [1.0]
-        others = [[times[m] for m in window if m != n] for n in window]
-        weights = [
-            float(np.prod([(time - t) / (times[n] - t) for t in rest]))
-            for n, rest in zip(window, others, strict=True)
-        ]
-        return list(window), weights
+        return list(window), lagrange_weights(times[list(window)], time).tolist()
 
     def _field(self, number: int, name: str) -> NDArray:
         """velocity, rotation or gradient at one of the stored times, components first."""
@@ -170,9 +164,3 @@ def refuse_gaps(times: NDArray, begin: float, end: float) -> None:
                 f"between the times {times[n]:.9g} and {times[n + 1]:.9g} no field is stored, others are "
                 f"{usual:.3g} apart: fields are missing; startTime and endTime can choose a part without the gap"
             )
-
-
-def _one_of(name: str, word: str, allowed) -> str:
-    if word not in allowed:
-        raise ValueError(f"{name} is '{word}'; stored fields allow: {' '.join(allowed)}")
-    return word

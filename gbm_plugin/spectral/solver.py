@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gbm_plugin.flow import NEEDS
+from gbm_plugin.sampling import NEEDS, one_of
 from gbm_plugin.spectral import interpolation as interpolate
 from gbm_plugin.spectral.arrays import Array, Arrays
 from gbm_plugin.spectral.forcing import Forcing
@@ -50,8 +50,8 @@ class SpectralSolver:
         for name, value in (("time_step", time_step), ("cfl", cfl)):
             if value is not None and not 0 < value < np.inf:
                 raise ValueError(f"{name} must be positive, got {value}")
-        _one_of("scheme", scheme, SCHEMES)
-        _one_of("interpolation", interpolation, interpolate.WORDS)
+        one_of("scheme", scheme, SCHEMES)
+        one_of("interpolation", interpolation, interpolate.WORDS)
         self.modes = Modes(cells, box)
         self.operators = _operators(device, self.modes, viscosity, precision, threads)
         self.forcing = Forcing() if forcing is None else forcing
@@ -166,7 +166,7 @@ class SpectralSolver:
         past, is a ValueError. Derivatives are spectrally exact at the nodes and interpolated as the velocity
         is.
         """
-        _one_of("need", need, NEEDS)
+        one_of("need", need, NEEDS)
         points = np.ascontiguousarray(positions, float)
         if points.shape[-1:] != (3,):
             raise ValueError(f"positions must have shape (..., 3), got {points.shape}")
@@ -257,7 +257,7 @@ class SpectralSolver:
 
 
 def _operators(device: str, modes: Modes, viscosity: float, precision: str, threads: int) -> Arrays:
-    _one_of("device", device, ("cpu", "gpu"))
+    one_of("device", device, ("cpu", "gpu"))
     if device == "cpu":
         return Slabs(modes, viscosity, precision, threads)
     try:
@@ -267,8 +267,3 @@ def _operators(device: str, modes: Modes, viscosity: float, precision: str, thre
     except Exception as error:  # CuPy raises its own kinds for a missing driver or device
         raise ValueError(f'device "gpu" needs CuPy and a CUDA device: {str(error).splitlines()[0]}') from None
     return Arrays(modes, viscosity, precision, cupy)
-
-
-def _one_of(name: str, word: str, allowed) -> None:
-    if word not in allowed:
-        raise ValueError(f'{name} must be one of {", ".join(allowed)}, got "{word}"')

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gbm_plugin.case.fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green
+from gbm_plugin.case.fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green_vortex
 
 
 def direct(modes: FourierModes, x: np.ndarray) -> np.ndarray:
@@ -63,9 +63,9 @@ def test_peaked_spectrum_has_its_sum_and_its_peak():
     assert max(spectrum, key=spectrum.get) == 3  # of k^4 exp(-2 (k/peak)^2)
 
 
-def test_taylor_green():
+def test_taylor_green_vortex():
     x = points((8, 8, 8), 0.5)
-    u = taylor_green(1.5).on_lattice((8, 8, 8), 0.5)
+    u = taylor_green_vortex(1.5).on_lattice((8, 8, 8), 0.5)
     sin, cos = np.sin(x), np.cos(x)
     expected = [
         sin[..., 0] * cos[..., 1] * cos[..., 2],

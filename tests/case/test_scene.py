@@ -36,7 +36,9 @@ def test_defaults(case):
     assert scene.coupling == Coupling("socket", 120.0, "127.0.0.1", 0)
     assert (scene.density, scene.record_interval, scene.interpolation) == (1.0, 10, "trilinear")
     family = scene.families[0]
-    assert family.model == Model("ab3", "freeDrain", "consistent", "sine", False, None)
+    assert family.model == Model(
+        integrator="ab3", mobility="freeDrain", bending_torque="consistent", curvature_law="sine"
+    )
     assert (family.seed, family.shape, family.positions) == (1, "straight", None)
     assert family.bending_stiffness == 0 and family.radius == pytest.approx(0.1)
 
@@ -52,8 +54,8 @@ def test_words_of_all_families_and_of_one(case):
         }""",
     )
     a, b = (f.model for f in scene.families)
-    assert a == Model("implicit", "freeDrain", "consistent", "discreteRod", False, 1e-3)
-    assert b == Model("auto", "freeDrain", "consistent", "sine", False, 1e-5)
+    assert a == Model(integrator="implicit", curvature_law="discreteRod", tolerance=1e-3)
+    assert b == Model(integrator="auto", tolerance=1e-5)
     assert scene.dynamic_viscosity == pytest.approx(2 * scene.kinematic_viscosity)
 
 
@@ -157,7 +159,7 @@ def test_initial_field_kinds(case):
     for text, energy in (
         ("field random; kineticEnergy 0.3; maxWavenumber 4;", 0.3),
         ("field random; spectrum table; table ((1 0.1) (3 0.2));", 0.3),
-        ("field taylorGreen; velocity 2;", 0.125 * 4),  # <u^2>/2 = U^2/8
+        ("field taylorGreenVortex; velocity 2;", 0.125 * 4),  # <u^2>/2 = U^2/8
         ("field ABC; A 1; B 2; C 3;", 7.0),  # (A^2 + B^2 + C^2)/2
         ("field modes; modes (((0 1 0) (0 0 0) (-1 0 0)));", 0.25),  # sin(y)
     ):
@@ -169,7 +171,7 @@ def test_initial_field_kinds(case):
 @pytest.mark.parametrize(
     "text, expected",
     [
-        ("field wavy;", "'wavy'; allowed: random modes taylorGreen ABC"),
+        ("field wavy;", "'wavy'; allowed: random modes taylorGreenVortex ABC"),
         ("field random; kineticEnergy -1;", "'kineticEnergy'.*greater than 0"),
         ("field random; kineticEnergy 1; peak 3;", "unknown entry 'peak'"),
         ("field random; spectrum table; table (1 2);", "list of .shell energy."),

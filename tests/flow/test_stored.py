@@ -154,11 +154,11 @@ def nothing(_):
         (([0.0, 1.0], nothing, (1, 1)), "must be \\(3,\\)"),
         (
             ([0.0, 1.0], nothing, BOX, ORIGIN, 0.5, "cellPoint"),
-            "'cellPoint'; stored fields allow: trilinear cubic",
+            "'cellPoint'; allowed are trilinear, cubic",
         ),
         (
             ([0.0, 1.0], nothing, BOX, ORIGIN, 0.5, "cubic", "spline"),
-            "'spline'; stored fields allow: linear cubic",
+            "'spline'; allowed are linear, cubic",
         ),
     ],
 )

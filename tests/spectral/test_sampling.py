@@ -147,7 +147,7 @@ def test_single_precision_samples_in_double(points):
 
 def test_refusals():
     solver = smooth(16, "trilinear")
-    with pytest.raises(ValueError, match="need must be one of velocity, rotation, gradient"):
+    with pytest.raises(ValueError, match="allowed are velocity, rotation, gradient"):
         solver.sample(np.zeros((1, 3)), 0.0, need="vorticity")
     with pytest.raises(ValueError, match=r"shape \(\.\.\., 3\)"):
         solver.sample(np.zeros((4, 2)), 0.0)

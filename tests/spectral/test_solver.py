@@ -261,11 +261,11 @@ def test_blow_up_is_an_error_at_its_step():
         ({"time_step": None}, "exactly one of time_step and cfl"),
         ({"cfl": 0.3}, "exactly one of time_step and cfl"),
         ({"time_step": -0.1}, "time_step must be positive"),
-        ({"scheme": "euler"}, "scheme must be one of ab3, rk4"),
+        ({"scheme": "euler"}, "scheme is 'euler'; allowed are ab3, rk4"),
         ({"precision": "half"}, "precision"),
         ({"threads": 0}, "threads"),
-        ({"interpolation": "linear"}, "interpolation must be one of trilinear, cubic, exact"),
-        ({"device": "tpu"}, "device must be one of cpu, gpu"),
+        ({"interpolation": "linear"}, "interpolation is 'linear'; allowed are trilinear, cubic, exact"),
+        ({"device": "tpu"}, "device is 'tpu'; allowed are cpu, gpu"),
     ],
 )
 def test_bad_values_are_refused(change, message):

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...fiber.mobility import MOBILITIES
+from ...fiber.model import MOBILITIES
 from ...report.style import COLOURS, new_figure
 from ...statistics.buckling import REGIONS, probability
 from ..study import option

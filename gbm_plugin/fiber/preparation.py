@@ -1,6 +1,8 @@
-"""Every kernel that a choice of words needs, compiled or loaded before a run waits for it."""
+"""Every kernel that a choice of options needs, compiled or loaded before a run waits for it."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -8,13 +10,13 @@ from .fibers import Fibers
 from .stepper import Stepper
 
 
-def prepare(integrator="ab3", mobility="freeDrain", strain_coupling=False, repulsion=0.0) -> None:
+def prepare(**options: Any) -> None:
     """Move one small fiber with these options of a Stepper, by all that runs call."""
     fibers = Fibers.straight(1, 3, 1.0, 1.0, 1.0)
-    stepper = Stepper(fibers, 0.0, integrator, mobility, strain_coupling, repulsion=repulsion)
+    stepper = Stepper(fibers, 0.0, **options)
     extra = np.zeros((1, 3, 3, 3) if stepper.need == "gradient" else (1, 3, 3))
 
-    def observe():
+    def observe() -> None:
         stepper.observe(stepper.time, np.zeros((1, 3, 3)), extra)
 
     observe()

@@ -1,0 +1,47 @@
+"""What a flow gives at points, in the words that all flows and all who ask share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+NEEDS = ("velocity", "rotation", "gradient")  # each costs more than the one before
+
+
+class Flow(Protocol):
+    """Anything that carries fibers."""
+
+    def sample(self, positions: NDArray, time: float, need: str) -> tuple[NDArray, NDArray | None]:
+        """Velocity (..., 3) at positions (..., 3), and beside it what need asks for: "velocity" (None), "rotation"
+        (½∇×u, (..., 3)) or "gradient" ((..., 3, 3), [..., i, j] = du_i/dx_j)."""
+
+
+def one_of(name: str, word: str, allowed: Iterable[str]) -> str:
+    """word, if it is allowed; else ValueError."""
+    if word not in allowed:
+        raise ValueError(f"{name} is {word!r}; allowed are {', '.join(allowed)}")
+    return word
+
+
+def rotation_of(gradient: NDArray) -> NDArray:
+    """½∇×u (..., 3) of a gradient (..., 3, 3), [..., i, j] = du_i/dx_j."""
+    g = gradient
+    curl = (
+        g[..., 2, 1] - g[..., 1, 2],
+        g[..., 0, 2] - g[..., 2, 0],
+        g[..., 1, 0] - g[..., 0, 1],
+    )
+    return 0.5 * np.stack(curl, axis=-1)
+
+
+def lagrange_weights(times: ArrayLike, time: float) -> NDArray:
+    """Weights of values at the given times in their interpolating polynomial at one time."""
+    times = np.asarray(times, dtype=float)
+    weights = np.ones(len(times))
+    for j, own in enumerate(times):
+        for other in np.delete(times, j):
+            weights[j] *= (time - other) / (own - other)
+    return weights
