@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gbm_plugin.case.openfoam import environment
-from gbm_plugin.case.prepare import initial_fields, utility
+from gbm_plugin.case.prepare import initial_fields, make_mesh, utility
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.output.recording import Recorder
 
@@ -92,7 +92,7 @@ def make_case(
     )
     (path / "constant/fiberProperties").write_text(HEADER + words)
     if prepared:
-        utility(path, "blockMesh")
+        make_mesh(path)
         initial_fields(read_scene(path))
     return path
 

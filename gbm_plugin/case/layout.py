@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 from PyFoam.RunDictionary.SolutionDirectory import SolutionDirectory
@@ -49,10 +50,9 @@ def processors(case: Path) -> list[Path]:
 
 def as_time(name: str) -> float | None:
     """The time that a folder's name says; None for other names."""
-    try:
-        time = float(name)
-    except ValueError:
+    if not re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", name, flags=re.ASCII):
         return None
+    time = float(name)
     return time if math.isfinite(time) else None
 
 

@@ -1,72 +1,111 @@
-"""What a case needs before its solver starts: mesh, initial fields, decomposition."""
+"""What a case needs before its solver starts: mesh, initial fields, decomposition.
+
+What a failed or interrupted preparation leaves is never taken for a start: it is made again, or refused again.
+"""
 
 from __future__ import annotations
 
+import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import CaseError
 from ..files import created
+from . import made
 from .dictionary import Dictionary
-from .initial import is_made_here, read_initial_field, write_velocity
+from .initial import read_initial_field, write_velocity
 from .layout import fiber_state, processors, time_folders, velocity_file
+from .mesh import difference, has_mesh, read_box
 from .openfoam import utility
-from .scene import Scene
-from .times import Start, move_aside
+from .scene import Scene, box_of
+from .times import ZERO, Start, is_same_time, move_aside, replaceable_zero
 from .trust import refuse_links_out
 
+log = logging.getLogger(__name__)
 
-def prepare(scene: Scene, start: Start, ranks: int) -> None:
-    """Mesh and initial fields where the case does not have them, decomposed for this many ranks."""
+MESH = "mesh"
+
+
+def prepare(scene: Scene, start: Start, ranks: int) -> Scene:
+    """Mesh and initial fields where the case does not have them, decomposed for this many ranks. The scene as it is
+    then, of whose box the mesh decides."""
     case = scene.case
     if not start.continues:
-        if _mesh_time(case) < _newest(case / "system/blockMeshDict"):
-            refuse_links_out(case, case / "constant/polyMesh")
-            utility(case, "blockMesh")
-        initial_fields(scene)
-    if not _mesh_time(case):
+        make_mesh(case)
+        scene = replace(scene, **box_of(read_box(case)))
+        initial_fields(scene, start.time)
+    if not has_mesh(case) and not processors(case):
         raise CaseError(f"{case} has no mesh (constant/polyMesh) and no system/blockMeshDict to make one")
     if not (case / f"{case.name}.foam").is_file():  # ParaView opens the case by this name
         created(case / f"{case.name}.foam").close()
-    _decompose(case, start, ranks)
+    _decompose(scene, start, ranks)
+    return scene
 
 
-def _mesh_time(case: Path) -> float:
-    return _newest(case / "constant/polyMesh/points", case / "constant/polyMesh/points.gz")
+def make_mesh(case: Path) -> None:
+    """constant/polyMesh by blockMesh where there is none, or one that gbm made after another blockMeshDict.
+
+    A mesh of somebody else's making stays, and decides; where blockMeshDict describes another box, one line says so.
+    """
+    dictionary = case / "system/blockMeshDict"
+    source = dictionary.read_text(errors="replace") if dictionary.is_file() else ""
+    if has_mesh(case) and not made.is_half_made(case, MESH):
+        outdated = not made.is_made_from(case, MESH, source) and made.is_own(case, MESH)
+        if not source or not outdated:
+            if source and (text := difference(case)):
+                log.info("%s", text)
+            return
+    elif not source:
+        raise CaseError(f"{case} has no mesh (constant/polyMesh) and no system/blockMeshDict to make one")
+    refuse_links_out(case, case / "constant/polyMesh")
+    made.note_begin(case, MESH)
+    utility(case, "blockMesh")
+    made.note_made(case, MESH, (p for p in (case / "constant/polyMesh").iterdir() if p.is_file()), source)
 
 
-def _newest(*files: Path) -> float:
-    """When the newest of these files was written; 0 where there is none."""
-    return max((f.stat().st_mtime for f in files if f.is_file()), default=0.0)
-
-
-def initial_fields(scene: Scene) -> None:
-    """`0` from `0.orig`, with the velocity of system/initialFieldDict where there is one.
-
-    A velocity that is there already is only made anew if it was made here, and its dictionaries are newer.
+def initial_fields(scene: Scene, begin: float = 0.0) -> None:
+    """For a run that begins at time 0: `0` from `0.orig`, with the velocity of system/initialFieldDict where there is
+    one; whole or not at all. A `0` that gbm did not make stays as it is, and so does one that nothing can replace.
     """
     case = scene.case
-    zero = case / "0"
-    made = not zero.is_dir()
-    if made:
-        if any(abs(t - scene.start_time) < 1e-9 * scene.time_step for t in time_folders(case)):
-            return
-        if not (case / "0.orig").is_dir():
-            raise CaseError(f"{case} has neither a folder 0 nor 0.orig: initial fields are missing")
-        shutil.copytree(case / "0.orig", zero)
-    dictionary, velocity = case / "system/initialFieldDict", zero / "U"
-    if not dictionary.is_file() or not (case / "0.orig/U").is_file():
+    zero = case / ZERO
+    if begin != 0:
         return
-    newer = _newest(dictionary, case / "system/blockMeshDict") > _newest(velocity)
-    if made or (newer and is_made_here(velocity)):
-        if scene.cells is None:
-            raise CaseError(f"{dictionary} needs a blockMeshDict of one uniform block")
-        modes = read_initial_field(case)
-        try:
-            field = modes.on_lattice(scene.cells, offset=0.5)
-        except ValueError as error:
-            raise CaseError(f"{dictionary}: {error}") from None
-        write_velocity(case / "0.orig/U", velocity, field)
+    if zero.is_dir():
+        if not replaceable_zero(case):
+            return
+    elif (parts := processors(case)) and all(velocity_file(p / ZERO) for p in parts):
+        return
+    elif not velocity_file(case / "0.orig"):
+        raise CaseError(f"{case} has neither a folder 0 nor 0.orig with a U: initial fields are missing")
+    part = case / ".0.part"
+    shutil.rmtree(part, ignore_errors=True)
+    shutil.copytree(case / "0.orig", part)
+    try:
+        if (case / "system/initialFieldDict").is_file():
+            _initial_velocity(scene, case / "0.orig/U", part / "U")
+        if zero.is_dir() and any(not (part / p.relative_to(zero)).exists() for p in zero.rglob("*")):
+            move_aside(case, [zero])  # with what somebody put there
+        shutil.rmtree(zero, ignore_errors=True)
+        part.rename(zero)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    made.note_made(case, ZERO, (p for p in zero.rglob("*") if p.is_file()))
+
+
+def _initial_velocity(scene: Scene, template: Path, target: Path) -> None:
+    dictionary = scene.case / "system/initialFieldDict"
+    if not template.is_file():
+        raise CaseError(f"{dictionary} is there, and no {template} whose form its velocity could take")
+    if scene.cells is None:
+        raise CaseError(f"{dictionary} needs a mesh of one block of equal cells")
+    modes = read_initial_field(scene.case)
+    try:
+        field = modes.on_lattice(scene.cells, offset=0.5)
+    except ValueError as error:
+        raise CaseError(f"{dictionary}: {error}") from None
+    write_velocity(template, target, field)
 
 
 def ranks_of(case: Path, parallel: bool) -> int:
@@ -88,13 +127,18 @@ def reconstruct(case: Path) -> None:
         utility(case, "reconstructPar", "-newTimes")
 
 
-def _decompose(case: Path, start: Start, ranks: int) -> None:
+def _decompose(scene: Scene, start: Start, ranks: int) -> None:
     """Make the folders that this number of ranks reads, from those that are there; none is lost."""
+    case = scene.case
     present = processors(case)
-    if start.continues and len(present) == (ranks if ranks > 1 else 0):
+    names = [n for t, n in time_folders(case).items() if is_same_time(t, start.time, scene.time_step)]
+    together = any(velocity_file(case / n) for n in names)
+    divided = bool(present) and any(all(velocity_file(p / n) for p in present) for n in names)
+    fits = divided and len(present) == ranks if ranks > 1 else not present
+    if fits and (start.continues or not together):
         return
     if present:
-        if start.continues:
+        if divided and not together:
             reconstruct(case)
         move_aside(case, present)
     if ranks > 1:

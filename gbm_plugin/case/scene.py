@@ -11,11 +11,13 @@ import numpy as np
 from ..errors import CaseError
 from ..fiber.model import Model, ModelError, entry_name
 from .dictionary import Dictionary
+from .mesh import Box, read_box
 from .positions import read_positions
 from .share import Share
 from .trust import is_inside
 
 TRANSPORTS = ("socket", "tcp", "file")
+START_FROM = ("latestTime", "startTime", "firstTime")
 SHAPES = ("straight", "file")
 
 
@@ -86,6 +88,7 @@ class Scene:
     density: float
     time_step: float
     start_time: float
+    start_from: str  # where OpenFOAM begins: latestTime, startTime, firstTime
     end_time: float
     write_interval: float
     forcing: Forcing | None
@@ -108,6 +111,15 @@ class Scene:
         return replace(self, families=tuple(f.part(share) for f in self.families))
 
 
+def box_of(box: Box | None) -> dict[str, tuple | None]:
+    """The fields of a scene that say what its box is."""
+    return {
+        "box": box and box.size,
+        "origin": box and box.origin,
+        "cells": box and box.cells,
+    }
+
+
 def read_scene(case: Path | str) -> Scene:
     """The scene of an OpenFOAM case. CaseError, in one line, for every mistake."""
     case = Path(case)
@@ -124,7 +136,6 @@ def read_scene(case: Path | str) -> Scene:
             "is yes: fibers move with a fixed time step; set it to no and deltaT to the smallest step needed",
         )
     time_step = control.number("deltaT", above=0)
-    box, origin, cells = _read_box(case)
     fibers = Dictionary.read(case, "constant/fiberProperties")
     scene = Scene(
         case=case,
@@ -133,6 +144,7 @@ def read_scene(case: Path | str) -> Scene:
         density=fibers.number("rho", 1.0, above=0),
         time_step=time_step,
         start_time=control.number("startTime", 0.0),
+        start_from=control.word("startFrom", START_FROM, "latestTime"),
         end_time=control.number("endTime"),
         write_interval=_write_interval(control, time_step),
         forcing=_read_forcing(case),
@@ -140,9 +152,7 @@ def read_scene(case: Path | str) -> Scene:
         record_interval=fibers.integer("recordInterval", 10, least=1),
         coupling=_read_coupling(fibers),
         families=_read_families(case, fibers),
-        box=box,
-        origin=origin,
-        cells=cells,
+        **box_of(read_box(case)),
         texts=_texts(case),
     )
     fibers.done()
@@ -296,33 +306,6 @@ def _read_viscosity(case: Path) -> float:
     transport = Dictionary.read(case, "constant/transportProperties")
     transport.word("transportModel", ("Newtonian",), "Newtonian")
     return transport.number("nu", above=0)
-
-
-# corners of a box in blockMesh's order
-_CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
-
-
-def _read_box(case: Path) -> tuple:
-    """Size, origin and cells of a box of one block of equal cells in system/blockMeshDict; None each otherwise."""
-    nothing = (None, None, None)
-    if not (case / "system/blockMeshDict").is_file():
-        return nothing
-    d = Dictionary.read(case, "system/blockMeshDict")
-    try:
-        scale = d.number("convertToMeters", d.number("scale", 1.0))
-        vertices = np.array([list(v) for v in d.raw("vertices")], dtype=float) * scale
-        _, corners, cells, grading, ratios = d.raw("blocks")
-        low, size = vertices.min(axis=0), np.ptp(vertices, axis=0)
-        box = vertices.shape == (8, 3) and np.allclose(
-            vertices, low + size * _CORNERS, atol=1e-9 * size.max()
-        )
-        equal = grading == "simpleGrading" and [float(r) for r in ratios] == [1, 1, 1]
-        if not box or not equal or [int(c) for c in corners] != list(range(8)):
-            return nothing
-        nx, ny, nz = (int(n) for n in cells)
-    except (TypeError, ValueError):
-        return nothing
-    return tuple(size.tolist()), tuple(low.tolist()), (nx, ny, nz)
 
 
 def _texts(case: Path) -> dict[str, str]:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.foamfile import read_field, read_list
 from ..case.layout import numbered, processors, velocity_file
-from .foamfile import read_field, read_list
 
 
 def latest_time(case: Path | str, field: str) -> str | None:
@@ -18,33 +18,6 @@ def latest_time(case: Path | str, field: str) -> str | None:
         (time, path.name) for time, path in folders for end in ("", ".gz") if (path / (field + end)).is_file()
     ]
     return max(times)[1] if times else None
-
-
-def box_mesh(case: Path | str) -> tuple[tuple[int, int, int], NDArray[np.float64], NDArray[np.float64]]:
-    """Cells (nx, ny, nz), origin (3,) and size (3,) [m] of a mesh of one uniform block, x fastest.
-
-    Raises ValueError for any other mesh, FileNotFoundError if there is none.
-    """
-    folder = Path(case) / "constant" / "polyMesh"
-    if not any((folder / name).exists() for name in ("points", "points.gz")):
-        raise FileNotFoundError(f"no mesh in {folder}")
-    points, owner, neighbour = (read_list(folder / name) for name in ("points", "owner", "neighbour"))
-    if points.ndim != 2 or not np.isfinite(points).all() or not len(points) or not len(owner):
-        raise ValueError(f"{folder}: points or owner are not those of a mesh")
-    origin, size = points.min(axis=0), np.ptp(points, axis=0)
-    if not (size > 0).all() or not np.isfinite(size).all():
-        raise ValueError(f"the mesh in {folder} is flat")
-    planes = [np.unique(np.round((points[:, i] - origin[i]) / size[i], 9)) for i in range(3)]
-    cells = tuple(len(plane) - 1 for plane in planes)
-    uniform = all(
-        np.allclose(np.diff(plane), 1 / n, rtol=1e-5) for plane, n in zip(planes, cells, strict=True)
-    )
-    # in a block with x fastest, neighbours across a face differ by one of three strides
-    steps = np.unique(neighbour - owner[: len(neighbour)]) if len(neighbour) <= len(owner) else [-1]
-    strides = {stride for stride, n in zip((1, cells[0], cells[0] * cells[1]), cells, strict=True) if n > 1}
-    if not uniform or int(owner.max()) + 1 != np.prod(cells) or not set(map(int, steps)) <= strides:
-        raise ValueError(f"the mesh in {folder} is not one block of equal cells, x fastest")
-    return cells, origin, size
 
 
 def read_velocity(case: Path | str, time: str, cells: tuple[int, int, int]) -> NDArray[np.float64]:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..case.layout import results
+from ..case.mesh import box_mesh
 from ..case.trust import check_case
 from ..files import replaced, write_text
-from ..output.field import box_mesh, latest_time, read_velocity, vorticity_magnitude
+from ..output.field import latest_time, read_velocity, vorticity_magnitude
 from ..output.recording import Recording, open_recording
 from ..output.tables import read_forcing
 from ..scales import kolmogorov_length

@@ -25,6 +25,7 @@ from ..case.trust import check_case
 from ..errors import RunError
 from ..files import created
 from ..output.restarts import keep_earlier
+from .driver import COMPLETE
 from .progress import Progress
 from .standstill import Pulse, kill_session, where_it_stands
 from .words import closing, opening
@@ -46,8 +47,12 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
     scene = read_scene(case)
     ranks = ranks_of(case, parallel)
     with _only_run(case) as lock:
-        start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh)
-        prepare(scene, start, ranks)
+        start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh, scene.start_from)
+        if start.complete:
+            reconstruct(case)
+            log.info(COMPLETE, start.time)
+            return
+        scene = prepare(scene, start, ranks)
         _remove_addresses(case)
         opening(scene, start.time, f"; see log.{scene.application} and log.gbmDaemon in {case}")
         _Processes(scene, ranks, start.time, lock).run()

@@ -6,6 +6,7 @@ Results go to the folder `spectral` in the case, which is laid out as an OpenFOA
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,9 @@ from ..output.restarts import keep_earlier
 from ..scales import kolmogorov_length, taylor_reynolds
 from ..spectral import EswaranPope, LinearForcing, SpectralSolver
 from ..spectral.interpolation import WORDS
-from .driver import Carrier, Run, results_folder
+from .driver import COMPLETE, Carrier, Run, results_folder
+
+log = logging.getLogger(__name__)
 
 FLOW_FILE = "uniform/flow.npz"
 COLUMNS = (
@@ -45,7 +48,12 @@ def run_spectral(
             f"spectral solver's; allowed: {' '.join(WORDS)}"
         )
     folder = results_folder(scene.case, "spectral")
-    start = choose_start(folder, scene.start_time, scene.end_time, scene.time_step, fresh)
+    start = choose_start(
+        folder, scene.start_time, scene.end_time, scene.time_step, fresh, makes_beginning=True
+    )
+    if start.complete:
+        log.info(COMPLETE, start.time)
+        return True
     solver = SpectralSolver(
         cells,
         scene.kinematic_viscosity,

@@ -20,9 +20,8 @@ from ..files import write_text
 from ..flow import StoredFlow, hdf5_flow
 from ..flow.grid import WORDS
 from ..flow.stored import SAME_TIME, refuse_gaps
-from ..output.field import box_mesh
 from ..output.stored import case_flow
-from .driver import Carrier, Run, results_folder
+from .driver import COMPLETE, Carrier, Run, results_folder
 
 log = logging.getLogger(__name__)
 
@@ -45,14 +44,13 @@ def run_stored(
     not finite.
     """
     if scene.cells is None:
-        raise CaseError(f"{scene.case}/system/blockMeshDict: a replay needs one uniform block")
+        raise CaseError(f"{scene.case}/system/blockMeshDict: a replay needs a mesh of one uniform block")
     if scene.interpolation not in WORDS:
         raise CaseError(
             f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of those "
             f"for stored fields; allowed: {' '.join(WORDS)}"
         )
     if fields is None:
-        scene = _on_its_mesh(scene)
         where = (scene.cells, scene.box, scene.origin)
         flow = case_flow(scene.case, *where, scene.interpolation, in_time, every)
     else:
@@ -64,7 +62,10 @@ def run_stored(
             )
     begin, end = _range(scene, flow)
     folder = results_folder(scene.case, "stored")
-    start = choose_start(folder, begin, end, scene.time_step, fresh)
+    start = choose_start(folder, begin, end, scene.time_step, fresh, makes_beginning=True)
+    if start.complete:
+        log.info(COMPLETE, start.time)
+        return True
     source = {
         "fields": str(Path(fields).resolve()) if fields else "time folders",
         "every": every,
@@ -73,19 +74,6 @@ def run_stored(
     }
     carrier = _Stored(flow, scene, source)
     return Run(replace(scene, case=folder, end_time=end), carrier, start).to_the_end()
-
-
-def _on_its_mesh(scene: Scene) -> Scene:
-    """The box to the digits of the mesh, as the fibers of a live run have it."""
-    try:
-        cells, origin, size = box_mesh(scene.case)
-    except FileNotFoundError:  # the fields alone were kept
-        return scene
-    if cells != scene.cells:
-        raise CaseError(
-            f"the mesh {scene.case}/constant/polyMesh has {cells} cells, system/blockMeshDict says {scene.cells}"
-        )
-    return replace(scene, origin=tuple(origin.tolist()), box=tuple(size.tolist()))
 
 
 def _range(scene: Scene, flow: StoredFlow) -> tuple[float, float]:

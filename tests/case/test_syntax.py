@@ -11,6 +11,8 @@ from gbm_plugin.errors import CaseError
 
 from conftest import HEADER, make_case
 
+pytestmark = pytest.mark.openfoam
+
 
 @pytest.fixture
 def case(tmp_path):

@@ -126,12 +126,16 @@ def test_flow_without_fibers_gets_some(case):
     assert not (case / "previous").exists()
 
 
-def test_finished_run_begins_afresh_each_time_in_a_new_folder(case):
+def test_finished_run_stays_and_fresh_repeats_it(case):
+    add_output(case, "0")
+    add_time(case, "1")
+    before = names(case)
+    assert start(case) == Start(1.0, True, complete=True) and names(case) == before
     for number in (1, 2):
         add_output(case, "0")
         add_time(case, "1")
         write(case, "report/report.json")
-        assert start(case) == Start(0.0, False)
+        assert start(case, fresh=True) == Start(0.0, False)
         assert {"1/U", "report/report.json", "postProcessing/fibers/0/fibers.h5"} <= names(
             case / f"previous/{number}"
         )
@@ -148,13 +152,6 @@ def test_fresh_on_request(case):
     add_time(case, "0.4")
     assert start(case, fresh=True) == Start(0.0, False)
     assert "0.4/U" in names(case / "previous/1")
-
-
-def test_controldict_that_decides_itself(case):
-    write(case, "system/controlDict", "FoamFile { class dictionary; }\nstartFrom startTime;\n")
-    add_time(case, "0.4")
-    assert choose_start(case, 0.4, END, STEP, False) == Start(0.4, False)
-    assert not (case / "previous").exists()
 
 
 def test_case_without_original_fields_keeps_its_0(case):

@@ -84,8 +84,7 @@ def test_links_within_folders(home, tmp_path):
 
 def test_a_mesh_that_is_a_link_is_not_made(home, tmp_path):
     case = make_case(tmp_path / "case", prepared=False)
-    (case / "constant/polyMesh").symlink_to(home)
-    os.utime(case / "system/blockMeshDict")
+    (case / "constant/polyMesh").symlink_to(home / "mesh")  # dangling: one that is there is used as it is
     with pytest.raises(CaseError, match="polyMesh is a link"):
         run(case)
 

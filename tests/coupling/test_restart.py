@@ -183,12 +183,13 @@ def test_no_time_folder_is_complete(tmp_path, whole):
     check_series(case)
 
 
-def test_finished_run_begins_afresh_and_is_extended(tmp_path, whole):
+def test_finished_run_stays_is_repeated_and_is_extended(tmp_path, whole):
     case = tmp_path / "case"
     shutil.copytree(whole(), case)
     first = final(case)
-    done = run_case(case)
-    assert "the run to time 0.4 is complete: starting a new one" in done.stdout
+    assert "the run to time 0.4 is complete; --fresh repeats it" in run_case(case).stdout
+    assert not (case / "previous").exists()
+    run_case(case, "--fresh")
     kept = case / "previous/1"
     assert distance(first, final(kept)) == 0 and distance(first, final(case)) == 0
     with open_recording(kept / "postProcessing/fibers") as recording:

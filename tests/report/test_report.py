@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
+from gbm_plugin.case.mesh import box_mesh
 from gbm_plugin.output import field
 from gbm_plugin.output.recording import Recorder, open_recording
 from gbm_plugin.report.paraview import write_series
@@ -80,7 +81,7 @@ def test_whole_report(case):
 @needs_mesh
 @pytest.mark.openfoam
 def test_velocity_has_x_fastest_and_the_mesh_its_cells(case):
-    cells, origin, size = field.box_mesh(case)
+    cells, origin, size = box_mesh(case)
     assert cells == (16, 16, 16)
     np.testing.assert_allclose(origin, 0, atol=1e-12)
     np.testing.assert_allclose(size, BOX, rtol=1e-5)
@@ -96,7 +97,7 @@ def test_mesh_that_is_not_a_uniform_box_is_refused(tmp_path):
     inner = next(line for line in text.splitlines() if line.startswith("(1.57"))
     file.write_text(text.replace(inner, inner.replace("1.57", "1.27")))
     with pytest.raises(ValueError, match="not one block of equal cells"):
-        field.box_mesh(tmp_path)
+        box_mesh(tmp_path)
 
 
 def test_vorticity_of_an_abc_flow_converges_at_second_order():

@@ -12,9 +12,10 @@ import fluidfoam
 import numpy as np
 import pytest
 
+from gbm_plugin.case.foamfile import read_field, read_list
+from gbm_plugin.case.mesh import box_mesh
 from gbm_plugin.case.openfoam import environment
-from gbm_plugin.output.field import box_mesh, read_velocity
-from gbm_plugin.output.foamfile import read_field, read_list
+from gbm_plugin.output.field import read_velocity
 from gbm_plugin.report.report import report
 from gbm_plugin.run.openfoam import run_stored
 
