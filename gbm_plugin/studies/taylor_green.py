@@ -8,6 +8,7 @@ each, so that a run goes on where it was killed, and several processes share man
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import multiprocessing
 import os
@@ -24,14 +25,16 @@ from numpy.typing import NDArray
 
 from ..fiber import Fibers, Stepper
 from ..flow import TaylorGreen
-from ..statistics.buckling import CRITERION, OUTSIDE, REGIONS, Tracks
+from ..statistics.buckling import OUTSIDE, REGIONS, Tracks
 from .study import steps
 
 RATE = np.pi  # S = πU₀/W
 SLICE = 25.0  # W/U₀ between checkpoints
 RECORD = 1.0  # W/U₀ between records of the centres
 MOST_SHAPES = 20_000  # kept of a scene
-MOST_SUBSTEPS = 8  # of a step by ab3 within eq. (10), beyond which implicit is faster
+NORMALISATIONS = ("2a(N-1)", "2aN")  # of end-to-end distances
+DEFAULT = ("strain", NORMALISATIONS[0])  # region and normalisation of what is measured
+MOST_SUBSTEPS = 3  # of a step by ab3 within eq. (10), beyond which implicit is faster
 STEPS = {"ab3": 0.025, "implicit": 0.05}  # W/U₀: see docs/results/buckling
 
 
@@ -59,8 +62,6 @@ class Scene:
     start: str = "plane"
     tilt: float = 0.0
     reseed: float = 0.0
-    regions: tuple[str, ...] = ("strain",)
-    normalisations: tuple[str, ...] = ("2a(N-1)",)
     seed: int = 1
 
     def __post_init__(self):
@@ -74,9 +75,6 @@ class Scene:
         for name, allowed in (("start", ("plane", "isotropic")), ("integrator", ("best", "ab3", "implicit"))):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} is {getattr(self, name)!r}; allowed are {', '.join(allowed)}")
-        for region in self.regions:
-            if region not in REGIONS:
-                raise ValueError(f"region is {region!r}; allowed are {', '.join(REGIONS)}")
 
     @property
     def bending_stiffness(self) -> float:
@@ -119,7 +117,7 @@ class Scene:
 
     def contour(self, normalisation: str) -> float:
         """What an end-to-end distance is divided by."""
-        return self.length * {"2a(N-1)": 1 - 1 / self.beads, "2aN": 1.0}[normalisation]
+        return self.length * (1 - 1 / self.beads if normalisation == NORMALISATIONS[0] else 1.0)
 
     @property
     def file(self) -> str:
@@ -131,7 +129,7 @@ class Scene:
 @dataclass
 class Records:
     """What a run keeps beside its counts: times (T,), centres (T, F, 2) and ratios (T, F) of end-to-end
-    distances at them; of each event of the first region its shape where it was bent most, relative to the
+    distances at them; of each event in a region of strain its shape where it was bent most, relative to the
     stagnation point (E, N, 2)."""
 
     times: list = field(default_factory=list)
@@ -143,7 +141,7 @@ class Records:
 class Run:
     """A scene under way.
 
-    tracks: {(region, normalisation): Tracks}; visited: (F,) the last time in the first region [W/U₀], NaN for
+    tracks: {(region, normalisation): Tracks}; visited: (F,) the last time in a region of strain [W/U₀], NaN for
     never; crossed: (F,) the last time at which the centre went from one vortex to the next; seconds: processor
     time so far.
     """
@@ -152,8 +150,7 @@ class Run:
         self.scene, self.flow = scene, TaylorGreen(1.0, 1.0)
         self.random = np.random.default_rng(scene.seed)
         self.stepper = scene.stepper(scene.positions(scene.count, self.random), 0.0)
-        pairs = [(region, norm) for region in scene.regions for norm in scene.normalisations]
-        self.tracks = {pair: Tracks(scene.count, CRITERION) for pair in pairs}
+        self.tracks = {pair: Tracks(scene.count) for pair in itertools.product(REGIONS, NORMALISATIONS)}
         self.visited, self.crossed = np.full(scene.count, np.nan), np.zeros(scene.count)
         self.reseeded = np.zeros(scene.count, int)
         self.seconds, self.records = 0.0, Records()
@@ -199,12 +196,11 @@ class Run:
         ends = (positions[:, -1] - positions[:, 0])[:, :2]
         distance = np.hypot(ends[:, 0], ends[:, 1])
         x, y = np.pi * positions[..., 0].mean(axis=1), np.pi * positions[..., 1].mean(axis=1)
-        first = next(iter(self.tracks))
-        for name in self.scene.regions:
-            region = REGIONS[name](x, y, ends)
-            for norm in self.scene.normalisations:
+        for name, find in REGIONS.items():
+            region = find(x, y, ends)
+            for norm in NORMALISATIONS:
                 finished = self.tracks[name, norm].observe(region, distance / self.scene.contour(norm))
-                if (name, norm) == first:
+                if (name, norm) == DEFAULT:
                     self._shapes(positions, x, y, distance, finished)
                     self.visited[region != OUTSIDE] = self.time
         vortex = np.floor(x / np.pi) * 1e6 + np.floor(y / np.pi)
@@ -216,7 +212,7 @@ class Run:
         """Keep the most bent shape of each event until it is over."""
         if finished.any() and len(self.records.shapes) < MOST_SHAPES:
             self.records.shapes.extend(self._shape[finished])
-        bent = self.tracks[next(iter(self.tracks))].bent
+        bent = self.tracks[DEFAULT].bent
         self._deepest[~bent | finished] = np.inf
         deeper = np.flatnonzero(bent & (distance < self._deepest))
         if len(deeper):
@@ -229,7 +225,7 @@ class Run:
         distance = np.linalg.norm(positions[:, -1] - positions[:, 0], axis=-1)
         self.records.times.append(self.time)
         self.records.centres.append(positions.mean(axis=1).astype(np.float32))
-        self.records.ratios.append((distance / self.scene.contour("2a(N-1)")).astype(np.float32))
+        self.records.ratios.append((distance / self.scene.contour(NORMALISATIONS[0])).astype(np.float32))
 
     def _replace(self) -> None:
         """New fibers for those that have been in no region for `reseed`."""

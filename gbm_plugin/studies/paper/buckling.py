@@ -19,29 +19,29 @@ from ...fiber.model import MOBILITIES
 from ...report.style import COLOURS, new_figure
 from ...statistics.buckling import REGIONS, probability
 from ..study import option
-from ..taylor_green import Run, Scene, run_scenes
+from ..taylor_green import NORMALISATIONS, Run, Scene, run_scenes
 
 CURVE = (
     *(
         1.0,
-        5.0,
         10.0,
-        15.0,
         20.0,
         25.0,
         30.0,
         35.0,
         40.0,
+        45.0,
         50.0,
         60.0,
-        75.0,
+        70.0,
+        80.0,
         100.0,
-        150.0,
+        140.0,
         200.0,
         300.0,
         450.0,
     ),
-    *(700.0, 1e3, 2e3, 5e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7, 3e7, 1e8),
+    *(1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7, 1e8),
 )
 SETTLED = 100.0  # W/U₀ without leaving a vortex, after which a fiber counts as trapped in it
 
@@ -87,21 +87,24 @@ def run(
 
     Raises ValueError for a number or word that is not allowed.
     """
+    if region not in REGIONS:
+        raise ValueError(f"region is {region!r}; allowed are {', '.join(REGIONS)}")
     if not (np.isfinite(end) and end > 0):
         raise ValueError(f"end is {end}; it must be finite and positive")
-    options = {"count": count, "beads": beads, "mobility": mobility, "seed": seed, "regions": (region,)}
+    options = {"count": count, "beads": beads, "mobility": mobility, "seed": seed}
     options |= {"integrator": integrator, "time_step": time_step, "tolerance": tolerance, "reseed": reseed}
     scenes = [Scene(float(number), **options) for number in dict.fromkeys(sp or CURVE)]
     folder = state or Path("buckling.state")
     runs = run_scenes(scenes, end, folder, workers, "buckling")
-    found = [_row(run) for run in runs]
+    found = [row_of(run, region) for run in runs]
     if state is None:
         shutil.rmtree(folder, ignore_errors=True)
-    return {"end": end} | options | {"length_over_width": scenes[0].length, "rows": found}
+    return {"end": end, "region": region} | options | {"length_over_width": scenes[0].length, "rows": found}
 
 
-def _row(run: Run) -> dict:
-    tracks = next(iter(run.tracks.values()))
+def row_of(run: Run, region: str = "strain", normalisation: str = NORMALISATIONS[0]) -> dict:
+    """What is known of one Sperm number, as a line of the table."""
+    tracks = run.tracks[region, normalisation]
     found = probability(tracks.events, tracks.tracks)
     trapped = run.time - run.crossed > SETTLED
     idle = run.time - np.nan_to_num(run.visited, nan=0.0) > SETTLED
@@ -139,7 +142,7 @@ def table(result: dict) -> str:
     """The curve as text."""
     lines = [
         f"{result['count']} fibers of {result['beads']} beads, {result['mobility']}, region "
-        f"{result['regions'][0]}, {result['end']:g} W/U0, seed {result['seed']}",
+        f"{result['region']}, {result['end']:g} W/U0, seed {result['seed']}",
         "        Sp     8πSp/c    tracks    events       P          ±   binomial  trapped   seconds",
     ]
     for r in result["rows"]:

@@ -33,7 +33,7 @@ def test_command_line(tmp_path, monkeypatch, capsys):
 
 def test_slices_and_restarts_change_nothing(tmp_path):
     """To the last bit: saved in the middle of a track, and moved by other processes."""
-    scenes = [Scene(sp, count=24, regions=("strain", "square"), time_step=0.05) for sp in (5.0, 1e4)]
+    scenes = [Scene(sp, count=24, time_step=0.05) for sp in (5.0, 1e4)]
     for scene, moved in zip(scenes, run_scenes(scenes, 4.0, tmp_path / "b", workers=2), strict=True):
         whole = Run(scene)
         whole.advance(2.0)
