@@ -124,3 +124,22 @@ def probability(events: ArrayLike, tracks: ArrayLike) -> Probability:
     binomial = np.sqrt(value * (1 - value) / total)
     error = float(np.sqrt(square) / total)
     return Probability(float(value), error, float(binomial), int(total), int(events.sum()))
+
+
+def difference(one: tuple[ArrayLike, ArrayLike], other: tuple[ArrayLike, ArrayLike]) -> tuple[float, float]:
+    """P of one minus P of the other, events and tracks (F,) each, and its standard error.
+
+    The fibers of both are taken in pairs, as they start alike: what they have in common does not count as error.
+    NaN where one has no tracks.
+    """
+    parts, values = [], []
+    for events, tracks in (one, other):
+        events, tracks = np.asarray(events, float), np.asarray(tracks, float)
+        if tracks.sum() == 0:
+            return np.nan, np.nan
+        values.append(events.sum() / tracks.sum())
+        parts.append((events - values[-1] * tracks) / tracks.sum())
+    apart = parts[0] - parts[1]
+    return float(values[0] - values[1]), float(
+        np.sqrt((apart**2).sum() * len(apart) / max(len(apart) - 1, 1))
+    )

@@ -76,11 +76,15 @@ def link_spins(links: NDArray, radius: float, stiffness: float, flow, kind: str)
     return 0.5 * (spins[1:] + spins[:-1])
 
 
-def growth(sperm_number: float, beads: int, kind: str, flow: str = "linear") -> tuple[NDArray, NDArray]:
-    """Growth rates over S, of even shapes and of odd ones, each falling; the chain is LENGTH × W long, 2aN."""
-    radius = LENGTH / beads / 2
-    stiffness = np.pi * LENGTH**4 / sperm_number
+def link_matrices(beads: int, kind: str, flow: str = "linear") -> tuple[NDArray, NDArray]:
+    """B, C (N−1, N−1) of A/S = B + C/Sp, for a chain of length 2aN = LENGTH × W."""
     carrier = TaylorGreen(1.0, 1.0) if flow == "cellular" else LinearFlow(np.diag([np.pi, -np.pi, 0.0]))
+    rigid, soft = (_differences(beads, kind, carrier, stiffness) for stiffness in (1.0, 0.0))
+    return soft / np.pi, (rigid - soft) * LENGTH**4
+
+
+def _differences(beads: int, kind: str, carrier, stiffness: float) -> NDArray:
+    """A by central differences."""
     count = beads - 1
     matrix = np.zeros((count, count))
     for k in range(count):
@@ -88,30 +92,34 @@ def growth(sperm_number: float, beads: int, kind: str, flow: str = "linear") -> 
             angle = np.full(count, np.pi / 2)
             angle[k] += sign * TILT
             links = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=-1)
-            matrix[:, k] += sign * link_spins(links, radius, stiffness, carrier, kind) / (2 * TILT)
-    mirrored = matrix[::-1, ::-1]
-    odd = np.linalg.eigvals(0.5 * (matrix + mirrored) @ _projector(count, 1))
-    even = np.linalg.eigvals(0.5 * (matrix + mirrored) @ _projector(count, -1))
-    return _falling(even, count // 2), _falling(odd, count - count // 2)
+            matrix[:, k] += (
+                sign * link_spins(links, LENGTH / beads / 2, stiffness, carrier, kind) / (2 * TILT)
+            )
+    return matrix
 
 
-def _projector(count: int, parity: int) -> NDArray:
-    """Onto link angles that are even (1) or odd (−1) about the middle of the chain."""
-    return 0.5 * (np.eye(count) + parity * np.eye(count)[::-1])
+def growth(matrices: tuple[NDArray, NDArray], sperm_number: float) -> tuple[NDArray, NDArray]:
+    """Growth rates over S, of even shapes and of odd ones, each falling."""
+    matrix = matrices[0] + matrices[1] / sperm_number
+    half = len(matrix) // 2
+    flipped, middle = matrix[:, ::-1], half + len(matrix) % 2
+    odd = (matrix - flipped)[:half, :half]  # of link angles that change their sign at the middle
+    even = (matrix + flipped)[:middle, :middle]
+    even[:, half:] /= 2  # a middle link is its own mirror image
+    return _falling(odd), _falling(even)
 
 
-def _falling(values: NDArray, kept: int) -> NDArray:
-    """The eigenvalues of one parity over S: the others are exact zeros."""
-    order = np.argsort(np.abs(values))[len(values) - kept :]
-    return np.sort(values[order].real)[::-1] / np.pi
+def _falling(matrix: NDArray) -> NDArray:
+    return np.sort(np.linalg.eigvals(matrix).real)[::-1]
 
 
-def threshold(number: int, beads: int, kind: str, flow: str = "linear") -> float:
-    """Sp at which the first or second shape begins to grow: the first even, and the second odd rate vanish."""
+def threshold(matrices: tuple[NDArray, NDArray], number: int) -> float:
+    """Sp at which the first shape (1), or the second (2), begins to grow: the first even rate vanishes, or the
+    second odd one."""
     low, high = 1.0, 1e4
     for _ in range(60):
         middle = np.sqrt(low * high)
-        even, odd = growth(middle, beads, kind, flow)
+        even, odd = growth(matrices, middle)
         low, high = (low, middle) if (even[0] if number == 1 else odd[1]) > 0 else (middle, high)
     return float(np.sqrt(low * high))
 
@@ -125,9 +133,10 @@ def run(beads: Sequence[int] = (6, 12, 20)) -> dict:
     cases = [(n, kind, flow) for n in beads for kind in ("freeDrain", "rpy") for flow in FLOWS]
     found = []
     for n, kind, flow in steps(cases, len(cases), "thresholds"):
+        matrices = link_matrices(n, kind, flow)
         row = {"beads": n, "mobility": kind, "flow": flow}
-        row |= {f"threshold_{k}": threshold(k, n, kind, flow) for k in (1, 2)}
-        found.append(row | {"growth_at_450": float(growth(450.0, n, kind, flow)[0][0])})
+        row |= {f"threshold_{k}": threshold(matrices, k) for k in (1, 2)}
+        found.append(row | {"growth_at_450": float(growth(matrices, 450.0)[0][0])})
     return {"rows": found}
 
 
