@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Protocol
 
@@ -39,9 +40,8 @@ def rotation_of(gradient: NDArray) -> NDArray:
 
 def lagrange_weights(times: ArrayLike, time: float) -> NDArray:
     """Weights of values at the given times in their interpolating polynomial at one time."""
-    times = np.asarray(times, dtype=float)
-    weights = np.ones(len(times))
-    for j, own in enumerate(times):
-        for other in np.delete(times, j):
-            weights[j] *= (time - other) / (own - other)
-    return weights
+    times = [float(own) for own in times]
+    others = [times[:j] + times[j + 1 :] for j in range(len(times))]
+    return np.array(
+        [math.prod((time - t) / (own - t) for t in rest) for own, rest in zip(times, others, strict=True)]
+    )

@@ -51,8 +51,11 @@ class TaylorGreen:
         """Velocity (..., 3) at positions (..., 3); extra as in LinearFlow.sample."""
         positions = np.asarray(positions, dtype=float)
         wavenumber = np.pi / self.width
-        x, y = wavenumber * positions[..., 0], wavenumber * positions[..., 1]
-        sin_x, cos_x, sin_y, cos_y = np.sin(x), np.cos(x), np.sin(y), np.cos(y)
+        phases = wavenumber * positions[..., :2]
+        (sin_x, sin_y), (cos_x, cos_y) = (
+            np.moveaxis(np.sin(phases), -1, 0),
+            np.moveaxis(np.cos(phases), -1, 0),
+        )
         velocity = np.zeros(positions.shape)
         velocity[..., 0] = self.velocity * sin_x * cos_y
         velocity[..., 1] = -self.velocity * cos_x * sin_y

@@ -15,37 +15,59 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit, vectorize
 from numpy.typing import ArrayLike, NDArray
 
 CRITERION = 0.8  # of the end-to-end distance over the contour between the end beads' centres
 OUTSIDE = np.iinfo(np.int64).min
+REGION = ["int64(float64, float64, float64, float64)"]  # of x̃, ỹ and the end-to-end vector in the plane
 
 
-def strain(x: NDArray, y: NDArray, ends: NDArray) -> NDArray[np.int64]:
+@njit
+def _number(i, j):
+    """One number for each pair of whole numbers."""
+    return (np.int64(i) << 32) + np.int64(j)
+
+
+@vectorize(REGION, cache=True)
+def strain(x, y, ends_x, ends_y):
     """(F,) regions where strain dominates rotation at x̃, ỹ (F,): cos(x̃ + ỹ) cos(x̃ − ỹ) > 0."""
     i, j = np.rint((x + y) / np.pi), np.rint((x - y) / np.pi)
-    return np.where((i + j) % 2 == 0, _number(i, j), OUTSIDE)
+    return _number(i, j) if (i + j) % 2 == 0 else OUTSIDE
 
 
-def square(x: NDArray, y: NDArray, ends: NDArray) -> NDArray[np.int64]:
+@vectorize(REGION, cache=True)
+def square(x, y, ends_x, ends_y):
     """(F,) squares of side W/2 around the stagnation points: |x̃ − mπ|, |ỹ − nπ| < π/4."""
     i, j = np.rint(x / np.pi), np.rint(y / np.pi)
-    inside = np.maximum(np.abs(x - np.pi * i), np.abs(y - np.pi * j)) < np.pi / 4
-    return np.where(inside, _number(i, j), OUTSIDE)
+    return _number(i, j) if max(abs(x - np.pi * i), abs(y - np.pi * j)) < np.pi / 4 else OUTSIDE
 
 
-def compression(x: NDArray, y: NDArray, ends: NDArray) -> NDArray[np.int64]:
-    """(F,) where the strain at the centre shortens the end-to-end vector (F, 2): cos x̃ cos ỹ (e_x² − e_y²) < 0."""
-    rate = np.cos(x) * np.cos(y) * (ends[:, 0] ** 2 - ends[:, 1] ** 2)
-    return np.where(rate < 0, _number(np.rint(x / np.pi), np.rint(y / np.pi)), OUTSIDE)
+@vectorize(REGION, cache=True)
+def compression(x, y, ends_x, ends_y):
+    """(F,) where the strain at the centre shortens the end-to-end vector: cos x̃ cos ỹ (e_x² − e_y²) < 0."""
+    rate = np.cos(x) * np.cos(y) * (ends_x * ends_x - ends_y * ends_y)
+    return _number(np.rint(x / np.pi), np.rint(y / np.pi)) if rate < 0 else OUTSIDE
 
 
 REGIONS = {"strain": strain, "square": square, "compression": compression}
 
 
-def _number(i: NDArray, j: NDArray) -> NDArray[np.int64]:
-    """One number for each pair of whole numbers."""
-    return (i.astype(np.int64) << 32) + j.astype(np.int64)
+@njit(cache=True)
+def _count(region, ratio, criterion, before, tracks, events, bent, running, finished):
+    """One sample of all fibers: see Tracks."""
+    for f in range(len(region)):
+        changed, straight = region[f] != before[f], ratio[f] >= criterion
+        finished[f] = bent[f] and changed
+        if changed:
+            bent[f] = False
+            running[f] = region[f] != OUTSIDE and straight
+            tracks[f] += running[f]
+            before[f] = region[f]
+        if running[f] and not straight:
+            running[f] = False
+            bent[f] = True
+            events[f] += 1
 
 
 class Tracks:
@@ -57,8 +79,8 @@ class Tracks:
 
     def __init__(self, fibers: int, criterion: float = CRITERION):
         self.criterion = criterion
-        self.tracks, self.events = np.zeros(fibers, int), np.zeros(fibers, int)
-        self.bent, self._open = np.zeros(fibers, bool), np.zeros(fibers, bool)
+        self.tracks, self.events = np.zeros(fibers, np.int64), np.zeros(fibers, np.int64)
+        self.bent, self._running = np.zeros(fibers, bool), np.zeros(fibers, bool)  # buckled, and not yet
         self._region: NDArray | None = None
 
     def observe(self, region: NDArray[np.int64], ratio: ArrayLike) -> NDArray[np.bool_]:
@@ -66,35 +88,27 @@ class Tracks:
 
         Returns which fibers have left (F,) a track that was an event.
         """
-        before = region if self._region is None else self._region
-        changed = region != before
-        straight = np.asarray(ratio) >= self.criterion
-        begun = changed & (region != OUTSIDE) & straight
-        finished = self.bent & changed
-        self._open = np.where(changed, begun, self._open)
-        buckled = self._open & ~straight
-        self._open &= straight
-        self.bent = (self.bent & ~changed) | buckled
-        self.tracks += begun
-        self.events += buckled
-        self._region = region
+        if self._region is None:
+            self._region = np.array(region, np.int64)
+        finished = np.zeros(len(self.tracks), bool)
+        own = (self._region, self.tracks, self.events, self.bent, self._running)
+        _count(region, np.asarray(ratio, float), self.criterion, *own, finished)
         return finished
 
-    def forget(self, fibers: NDArray[np.bool_]) -> None:
-        """The given fibers are replaced by new ones: what they were in counts no more."""
-        self.bent[fibers] = self._open[fibers] = False
-        if self._region is not None:
-            self._region = np.where(fibers, OUTSIDE, self._region)
+    def forget(self, fibers: NDArray[np.bool_], region: NDArray[np.int64]) -> None:
+        """The given fibers (F,) have been replaced by new ones, in these regions (F,)."""
+        self.bent[fibers] = self._running[fibers] = False
+        self._region[fibers] = region[fibers]
 
     def state(self) -> dict[str, NDArray]:
         """Everything that a restart needs, after the first sample."""
-        own = {"tracks": self.tracks, "events": self.events, "bent": self.bent, "open": self._open}
+        own = {"tracks": self.tracks, "events": self.events, "bent": self.bent, "running": self._running}
         return own | {"region": self._region}
 
     def restore(self, state) -> None:
         """Take back what state() gave."""
         self.tracks, self.events, self.bent = (np.array(state[n]) for n in ("tracks", "events", "bent"))
-        self._open, self._region = np.array(state["open"]), np.array(state["region"])
+        self._running, self._region = np.array(state["running"]), np.array(state["region"])
 
 
 @dataclass(frozen=True)

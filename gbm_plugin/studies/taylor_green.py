@@ -19,11 +19,12 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-import numba
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from ..fiber import Fibers, Stepper
+from ..fiber.threads import limited_to
 from ..flow import TaylorGreen
 from ..statistics.buckling import OUTSIDE, REGIONS, Tracks
 from .study import steps
@@ -138,6 +139,33 @@ class Records:
     shapes: list = field(default_factory=list)
 
 
+@njit(cache=True)
+def _measure(positions):
+    """(5, F): x̃ and ỹ of the centres, the end-to-end vector in the plane, its length."""
+    found = np.zeros((5, positions.shape[0]))
+    for f in range(positions.shape[0]):
+        for i in range(positions.shape[1]):
+            found[0, f] += np.pi * positions[f, i, 0] / positions.shape[1]
+            found[1, f] += np.pi * positions[f, i, 1] / positions.shape[1]
+        for c in range(2):
+            found[2 + c, f] = positions[f, -1, c] - positions[f, 0, c]
+        found[4, f] = np.hypot(found[2, f], found[3, f])
+    return found
+
+
+@njit(cache=True)
+def _keep_deepest(positions, x, y, distance, bent, finished, deepest, shape):
+    """Keep the shape in which the ends of each bent fiber were nearest, relative to its stagnation point."""
+    for f in range(len(bent)):
+        if finished[f] or not bent[f]:
+            deepest[f] = np.inf
+        if bent[f] and distance[f] < deepest[f]:
+            deepest[f] = distance[f]
+            for i in range(positions.shape[1]):
+                shape[f, i, 0] = positions[f, i, 0] - np.rint(x[f] / np.pi)
+                shape[f, i, 1] = positions[f, i, 1] - np.rint(y[f] / np.pi)
+
+
 class Run:
     """A scene under way.
 
@@ -193,32 +221,21 @@ class Run:
         """The flow at the beads, and where the fibers are."""
         positions = self.stepper.positions
         self._observe(positions)
-        ends = (positions[:, -1] - positions[:, 0])[:, :2]
-        distance = np.hypot(ends[:, 0], ends[:, 1])
-        x, y = np.pi * positions[..., 0].mean(axis=1), np.pi * positions[..., 1].mean(axis=1)
+        x, y, *ends, distance = _measure(positions)
         for name, find in REGIONS.items():
-            region = find(x, y, ends)
+            region = find(x, y, *ends)
             for norm in NORMALISATIONS:
                 finished = self.tracks[name, norm].observe(region, distance / self.scene.contour(norm))
                 if (name, norm) == DEFAULT:
-                    self._shapes(positions, x, y, distance, finished)
+                    if finished.any() and len(self.records.shapes) < MOST_SHAPES:
+                        self.records.shapes.extend(self._shape[finished])
+                    bent = self.tracks[DEFAULT].bent
+                    _keep_deepest(positions, x, y, distance, bent, finished, self._deepest, self._shape)
                     self.visited[region != OUTSIDE] = self.time
-        vortex = np.floor(x / np.pi) * 1e6 + np.floor(y / np.pi)
+        vortex = np.floor(x / np.pi) * 2.0**24 + np.floor(y / np.pi)
         if self._vortex is not None:
             self.crossed[vortex != self._vortex] = self.time
         self._vortex = vortex
-
-    def _shapes(self, positions, x, y, distance, finished) -> None:
-        """Keep the most bent shape of each event until it is over."""
-        if finished.any() and len(self.records.shapes) < MOST_SHAPES:
-            self.records.shapes.extend(self._shape[finished])
-        bent = self.tracks[DEFAULT].bent
-        self._deepest[~bent | finished] = np.inf
-        deeper = np.flatnonzero(bent & (distance < self._deepest))
-        if len(deeper):
-            self._deepest[deeper] = distance[deeper]
-            point = np.rint(np.stack([x, y], axis=-1)[deeper] / np.pi)
-            self._shape[deeper] = positions[deeper, :, :2] - point[:, None]
 
     def _record(self) -> None:
         positions = self.stepper.positions[..., :2]
@@ -236,8 +253,9 @@ class Run:
         positions = self.stepper.positions
         positions[old] = self.scene.positions(int(old.sum()), self.random)
         self.stepper = self.scene.stepper(positions, self.time)
-        for tracks in self.tracks.values():
-            tracks.forget(old)
+        x, y, *ends, _ = _measure(positions)
+        for (name, _), tracks in self.tracks.items():
+            tracks.forget(old, REGIONS[name](x, y, *ends))
         self.visited[old], self.reseeded[old] = self.time, self.reseeded[old] + 1
         self._vortex = None
         self._sample()
@@ -361,8 +379,7 @@ def _elsewhere(left: dict[Scene, list[float]], folder: Path, workers: int) -> It
 
 def _serve(pipe: Connection) -> None:
     """A process that takes slices until its pipe is closed."""
-    numba.set_num_threads(1)
-    with suppress(EOFError, KeyboardInterrupt):
+    with suppress(EOFError, KeyboardInterrupt), limited_to(1):
         while True:
             task = pipe.recv()
             try:

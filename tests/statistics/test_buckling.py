@@ -53,28 +53,26 @@ def test_a_restart_changes_nothing():
 def test_strain_is_where_strain_dominates_rotation():
     """S² cos² x̃ cos² ỹ against S² sin² x̃ sin² ỹ, from the gradient itself."""
     x, y = np.random.default_rng(1).uniform(-9, 9, (2, 5000))
-    ends = np.zeros((5000, 2))
     stronger = (np.cos(x) * np.cos(y)) ** 2 > (np.sin(x) * np.sin(y)) ** 2
-    np.testing.assert_array_equal(strain(x, y, ends) != OUTSIDE, stronger)
+    np.testing.assert_array_equal(strain(x, y, 1.0, 0.0) != OUTSIDE, stronger)
 
 
 @pytest.mark.parametrize("region", REGIONS.values())
 def test_every_stagnation_point_has_a_region_of_its_own(region):
     m, n = (i.ravel() for i in np.meshgrid(np.arange(-3, 4), np.arange(-3, 4)))
-    ends = np.where(((m + n) % 2 == 0)[:, None], [0.0, 1.0], [1.0, 0.0])  # compressed
-    numbers = region(np.pi * m + 0.1, np.pi * n - 0.05, ends)
+    along_y = (m + n) % 2 == 0  # compressed
+    numbers = region(np.pi * m + 0.1, np.pi * n - 0.05, ~along_y, along_y)
     assert OUTSIDE not in numbers
     assert len(set(numbers)) == 49
 
 
 def test_square_lies_within_strain_and_compression_follows_the_direction():
     x, y = np.random.default_rng(2).uniform(0, 4 * np.pi, (2, 5000))
-    ends = np.tile([0.0, 1.0], (5000, 1))
-    inner, outer = square(x, y, ends) != OUTSIDE, strain(x, y, ends) != OUTSIDE
+    inner, outer = square(x, y, 0.0, 1.0) != OUTSIDE, strain(x, y, 0.0, 1.0) != OUTSIDE
     assert outer[inner].all()
     assert inner.mean() == pytest.approx(0.25, abs=0.02) and outer.mean() == pytest.approx(0.5, abs=0.02)
     # −cos x̃ cos ỹ is the rate of strain along y
-    np.testing.assert_array_equal(compression(x, y, ends) != OUTSIDE, np.cos(x) * np.cos(y) > 0)
+    np.testing.assert_array_equal(compression(x, y, 0.0, 1.0) != OUTSIDE, np.cos(x) * np.cos(y) > 0)
 
 
 def test_error_is_that_of_the_spread_between_fibers():

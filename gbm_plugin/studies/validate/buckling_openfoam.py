@@ -10,6 +10,7 @@ buckling probability is that of the analytic flow within the error of its differ
 from __future__ import annotations
 
 import argparse
+import itertools
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -111,7 +112,7 @@ def run(
     temporal = [
         {"cells": middle, "time_step": WIDTH * PATHS_END / coarse_steps}
         | {"paths_error": ends_apart(coarse["positions"][-1], fine["positions"][-1], radius)}
-        for (coarse_steps, coarse), (_, fine) in zip(chain, chain[1:], strict=False)
+        for (coarse_steps, coarse), (_, fine) in itertools.pairwise(chain)
     ]
     return {
         **{
@@ -182,10 +183,10 @@ def _probabilities(scene: Scene, counted: dict, end: float) -> list[dict]:
     """P of the recorded paths, of the analytic flow, and their difference, whose error counts the same starts."""
     tracks = Tracks(scene.count)
     for positions in counted["positions"]:
-        ends = (positions[:, -1] - positions[:, 0])[:, :2]
+        ends = (positions[:, -1] - positions[:, 0])[:, :2].T
         x, y = np.pi / WIDTH * np.moveaxis(positions.mean(axis=1)[:, :2], -1, 0)
-        ratio = np.hypot(*ends.T) / (WIDTH * scene.contour(DEFAULT[1]))
-        tracks.observe(strain(x, y, ends), ratio)
+        ratio = np.hypot(*ends) / (WIDTH * scene.contour(DEFAULT[1]))
+        tracks.observe(strain(x, y, *ends), ratio)
     analytic = Run(scene)
     analytic.advance(end)
     others = analytic.tracks[DEFAULT]
