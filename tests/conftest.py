@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gbm_plugin.case.openfoam import environment
+from gbm_plugin.case.openfoam import command, environment
 from gbm_plugin.case.prepare import initial_fields, make_mesh, utility
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.output.recording import Recorder
@@ -69,12 +69,15 @@ def make_case(
     initial: str | None = None,
     tight: bool = True,
     prepared: bool = True,
+    application: str | None = None,
 ) -> Path:
     """A small copy of the default case: the same dictionaries, other numbers."""
     path.mkdir(parents=True)
     for folder in ("0.orig", "constant", "system"):
         shutil.copytree(DEFAULT_CASE / folder, path / folder, ignore=shutil.ignore_patterns("polyMesh"))
     control = path / "system/controlDict"
+    if application is not None:
+        set_entry(control, "application", application)
     set_entry(control, "deltaT", repr(time_step))
     set_entry(control, "endTime", repr(steps * time_step))
     set_entry(control, "writeInterval", str(write_every))
@@ -143,12 +146,22 @@ def run_case(path: Path, *options: str) -> subprocess.CompletedProcess:
     return done
 
 
+def application(path: Path) -> str:
+    """The solver that a case names, whatever else is wrong with it."""
+    return re.search(r"^application\s+(\w+);", (path / "system/controlDict").read_text(), re.MULTILINE).group(
+        1
+    )
+
+
+def solver_log(path: Path) -> Path:
+    """Where the solver of a case leaves its log."""
+    return path / f"log.{application(path)}"
+
+
 def start_solver(path: Path, ranks: int = 1) -> subprocess.Popen:
-    """pimpleFoam alone, its log in log.pimpleFoam."""
-    argv = ["pimpleFoam", "-case", str(path)]
-    if ranks > 1:
-        argv = ["mpirun", "-np", str(ranks), "--oversubscribe", *argv, "-parallel"]
-    with (path / "log.pimpleFoam").open("w") as log:
+    """The solver of a case alone."""
+    with solver_log(path).open("w") as log:
+        argv = command(application(path), path, ranks)
         return subprocess.Popen(argv, env=environment(), stdout=log, stderr=subprocess.STDOUT)
 
 

@@ -41,11 +41,14 @@ def environment() -> dict[str, str]:
     InstallationError where there is no OpenFOAM, or one that is not supported, or the plugin is not built.
     """
     env, sourced = _tools()
-    own = Path(__file__).resolve().parents[2] / "build/lib"
-    library = Path(env.get("FOAM_USER_LIBBIN", own)) if sourced else own  # each has its own binary interface
+    own = Path(__file__).resolve().parents[2] / "build"
+    # each OpenFOAM has its own binary interface
+    library = Path(env.get("FOAM_USER_LIBBIN", own / "lib")) if sourced else own / "lib"
+    programs = Path(env.get("FOAM_USER_APPBIN", own / "bin")) if sourced else own / "bin"
     if not (library / PLUGIN).is_file():
         raise InstallationError(f"the plugin {PLUGIN} is not in {library}: build it with ./Allwmake")
     env["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, [str(library), env.get("LD_LIBRARY_PATH", "")]))
+    env["PATH"] = os.pathsep.join(filter(None, [str(programs), env.get("PATH", "")]))
     env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return env
 
@@ -77,7 +80,7 @@ def expanded(case: Path, dictionary: Path) -> str:
 
 def command(program: str, case: Path, ranks: int = 1) -> list[str]:
     """argv of a program on a case, on this many MPI ranks."""
-    if shutil.which(program) is None:
+    if shutil.which(program, path=environment()["PATH"]) is None:
         raise InstallationError(f"the OpenFOAM program '{program}' is not on the PATH")
     argv = [program, "-case", str(case)]
     if ranks > 1:

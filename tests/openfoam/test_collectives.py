@@ -41,10 +41,21 @@ CALLS = {
         "schemes are of the case; called in addSup and correct of every rank",
     ),
     "forcing/turbulenceForcing.C": (1, "made for each run"),
-    "eswaranPope/eswaranPope.C": (3, "made for each run; called in addSup and correct of every rank"),
+    "eswaranPope/eswaranPope.C": (
+        5,
+        "made for each run; called in addSup, endRate and correct of every rank",
+    ),
     "fiberCoupling/fiberCoupling.C": (6, "once a step, provisional or not as all daemons together say"),
     "fiberCoupling/sampling/beadExchange.C": (2, "locate and collect of every rank, with beads or without"),
-    "pressure/slab.C": (2, "made for each mesh"),
+    "transform/slab.C": (2, "made for each mesh"),
+    "transform/slabTransform.C": (2, "every rank sweeps, with layers and rows or without"),
+    "boxFoam/boxFlow.C": (6, "once a sweep of every rank"),
+    "boxFoam/boxVelocity.C": (
+        3,
+        "ranks with layers, which follow from n and the block alone, go round in a ring",
+    ),
+    "boxFoam/flowState.C": (3, "at a start; what the ranks found is one answer for all before it is used"),
+    "boxFoam/momentumSources.C": (1, "the options of a case are those of every rank"),
     "pressure/periodicLaplacian.C": (8, "PCG, whose residual is one for all, asks; every rank has a plan"),
     "pressure/periodicFFTPreconditioner.C": (3, "PCG again; sum_ is one for all"),
 }

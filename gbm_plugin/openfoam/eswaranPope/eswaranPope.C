@@ -12,6 +12,37 @@ namespace fv
 }
 }
 
+namespace
+{
+
+//- Sum of a b, in partial sums that vectorise
+double sumProducts(const Foam::label n, const double* a, const double* b)
+{
+    constexpr Foam::label lanes = 8;
+    double sums[lanes] = {};
+    Foam::label i = 0;
+
+    for (; i + lanes <= n; i += lanes)
+    {
+        for (Foam::label j = 0; j < lanes; ++j)
+        {
+            sums[j] += a[i + j]*b[i + j];
+        }
+    }
+    double sum = 0;
+    for (; i < n; ++i)
+    {
+        sum += a[i]*b[i];
+    }
+    for (const double s : sums)
+    {
+        sum += s;
+    }
+    return sum;
+}
+
+}
+
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
@@ -23,7 +54,8 @@ Foam::fv::eswaranPope::eswaranPope
     const fvMesh& mesh
 )
 :
-    turbulenceForcing(name, modelType, dict, mesh)
+    turbulenceForcing(name, modelType, dict, mesh),
+    work_(0)
 {
     read(dict);
     waves_.reset(new waveSum(mesh, process_->k()));
@@ -113,14 +145,28 @@ Foam::scalar Foam::fv::eswaranPope::power
 }
 
 
+Foam::scalar Foam::fv::eswaranPope::power(const flowStatistics&) const
+{
+    const scalar cells = returnReduce(scalar(mesh_.nCells()), sumOp<scalar>());
+
+    return returnReduce(work_, sumOp<scalar>())/cells;
+}
+
+
+void Foam::fv::eswaranPope::follow(const flowStatistics&)
+{
+    work_ = 0;
+}
+
+
 void Foam::fv::eswaranPope::choose(const flowStatistics&)
 {
-    if (atStart())
+    if (isExplicit())
     {
         force_ = process_->force();
     }
     process_->advance(mesh_.time().deltaTValue());
-    if (!atStart())
+    if (!isExplicit())
     {
         force_ = process_->force();
     }
@@ -186,4 +232,30 @@ bool Foam::fv::eswaranPope::read(const dictionary& dict)
     process_.reset(new shellProcess(variance, timeScale, cutoff, seed));
 
     return true;
+}
+
+
+void Foam::fv::eswaranPope::addRate(const latticeLayer& layer)
+{
+    waves_->sum
+    (
+        force_,
+        layer,
+        [&](const label y, const scalarField (&f)[vector::nComponents])
+        {
+            for (direction d = 0; d < vector::nComponents; ++d)
+            {
+                const double* __restrict__ u =
+                    layer.velocity[d] + y*layer.stride;
+                double* __restrict__ rate = layer.rate[d] + y*layer.n.x();
+                const scalar* __restrict__ force = f[d].cdata();
+
+                for (label x = 0; x < layer.n.x(); ++x)
+                {
+                    rate[x] += force[x];
+                }
+                work_ += sumProducts(layer.n.x(), u, force);
+            }
+        }
+    );
 }

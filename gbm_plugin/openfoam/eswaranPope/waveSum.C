@@ -112,18 +112,94 @@ void Foam::waveSum::findRows(const vectorField& x)
         if (!known)
         {
             last = r;
-            List<scalarField> table(2*reach_);
-            for (label k = 1; k <= reach_; ++k)
-            {
-                const scalarField angle(k*here.component(vector::X));
-                table[2*k - 2] = cos(angle);
-                table[2*k - 1] = sin(angle);
-            }
-            tables.append(std::move(table));
+            tables.append(table(scalarField(here.component(vector::X))));
         }
         rows_[r].table = tables.size() - 1;
     }
     tables_.transfer(tables);
+}
+
+
+Foam::List<Foam::scalarField> Foam::waveSum::table(const scalarField& x) const
+{
+    List<scalarField> values(2*reach_);
+
+    for (label k = 1; k <= reach_; ++k)
+    {
+        const scalarField angle(k*x);
+        values[2*k - 2] = cos(angle);
+        values[2*k - 1] = sin(angle);
+    }
+    return values;
+}
+
+
+void Foam::waveSum::sumColumns
+(
+    const UList<amplitude>& amplitudes,
+    const scalar z,
+    List<amplitude>& columns
+) const
+{
+    const List<complex> w(waves(reach_, z));
+
+    columns = amplitude{Zero, Zero};
+    forAll(modes_, i)
+    {
+        amplitude a(amplitudes[i]);
+        if (modes_[i].conjugate)
+        {
+            a.im = -a.im;
+        }
+        columns[modes_[i].column].add(w[modes_[i].kz + reach_], a);
+    }
+}
+
+
+void Foam::waveSum::sumLines
+(
+    const UList<amplitude>& columns,
+    const scalar y,
+    List<amplitude>& lines
+) const
+{
+    const List<complex> w(waves(reach_, y));
+
+    lines = amplitude{Zero, Zero};
+    forAll(columns_, c)
+    {
+        lines[columns_[c].kx].add(w[columns_[c].ky + reach_], columns[c]);
+    }
+}
+
+
+void Foam::waveSum::sumRow
+(
+    const UList<amplitude>& lines,
+    const List<scalarField>& table,
+    const label size,
+    scalarField (&values)[vector::nComponents]
+) const
+{
+    for (direction d = 0; d < vector::nComponents; ++d)
+    {
+        values[d].setSize(size);
+        values[d] = 2*lines[0].re[d];
+        scalar* __restrict__ v = values[d].begin();
+
+        for (label k = 1; k <= reach_; ++k)
+        {
+            const scalar* __restrict__ cosine = table[2*k - 2].cdata();
+            const scalar* __restrict__ sine = table[2*k - 1].cdata();
+            const scalar re = 2*lines[k].re[d];
+            const scalar im = 2*lines[k].im[d];
+
+            for (label i = 0; i < size; ++i)
+            {
+                v[i] += re*cosine[i] - im*sine[i];
+            }
+        }
+    }
 }
 
 
@@ -141,47 +217,46 @@ void Foam::waveSum::sum(const UList<amplitude>& amplitudes, const use& f) const
         if (mag(r.z - z) > same)
         {
             z = r.z;
-            const List<complex> w(waves(reach_, z));
-
-            columns = amplitude{Zero, Zero};
-            forAll(modes_, i)
-            {
-                amplitude a(amplitudes[i]);
-                if (modes_[i].conjugate)
-                {
-                    a.im = -a.im;
-                }
-                columns[modes_[i].column].add(w[modes_[i].kz + reach_], a);
-            }
+            sumColumns(amplitudes, z, columns);
         }
-
-        const List<complex> w(waves(reach_, r.y));
-        lines = amplitude{Zero, Zero};
-        forAll(columns_, c)
-        {
-            lines[columns_[c].kx].add(w[columns_[c].ky + reach_], columns[c]);
-        }
-
-        const List<scalarField>& table = tables_[r.table];
-        for (direction d = 0; d < vector::nComponents; ++d)
-        {
-            values[d].setSize(r.size);
-            values[d] = 2*lines[0].re[d];
-            scalar* __restrict__ v = values[d].begin();
-
-            for (label k = 1; k <= reach_; ++k)
-            {
-                const scalar* __restrict__ cosine = table[2*k - 2].cdata();
-                const scalar* __restrict__ sine = table[2*k - 1].cdata();
-                const scalar re = 2*lines[k].re[d];
-                const scalar im = 2*lines[k].im[d];
-
-                for (label i = 0; i < r.size; ++i)
-                {
-                    v[i] += re*cosine[i] - im*sine[i];
-                }
-            }
-        }
+        sumLines(columns, r.y, lines);
+        sumRow(lines, tables_[r.table], r.size, values);
         f(r.first, values);
+    }
+}
+
+
+void Foam::waveSum::sum
+(
+    const UList<amplitude>& amplitudes,
+    const latticeLayer& layer,
+    const use& f
+) const
+{
+    const auto centre = [&](const label i, const direction d)
+    {
+        return constant::mathematical::twoPi*(i + 0.5)/layer.n[d];
+    };
+
+    if (layerTable_.empty())
+    {
+        scalarField x(layer.n.x());
+        forAll(x, i)
+        {
+            x[i] = centre(i, vector::X);
+        }
+        layerTable_ = table(x);
+    }
+
+    List<amplitude> columns(columns_.size());
+    List<amplitude> lines(reach_ + 1);
+    scalarField values[vector::nComponents];
+
+    sumColumns(amplitudes, centre(layer.k, vector::Z), columns);
+    for (label y = 0; y < layer.n.y(); ++y)
+    {
+        sumLines(columns, centre(y, vector::Y), lines);
+        sumRow(lines, layerTable_, layer.n.x(), values);
+        f(y, values);
     }
 }

@@ -24,6 +24,8 @@ Foam::fv::turbulenceForcing::turbulenceForcing
     powerOld_(0),
     deltaTOld_(0),
     hasOld_(false),
+    explicit_(false),
+    first_(false),
     rowTime_(0),
     rowPower_(0)
 {}
@@ -94,15 +96,9 @@ void Foam::fv::turbulenceForcing::start()
 }
 
 
-bool Foam::fv::turbulenceForcing::atStart() const
-{
-    return mesh_.data::lookupOrDefault<bool>("explicitSources", false);
-}
-
-
 Foam::scalar Foam::fv::turbulenceForcing::energyAtForce(const scalar k) const
 {
-    if (atStart() || !hasOld_)
+    if (explicit_ || !hasOld_)
     {
         return k;
     }
@@ -166,7 +162,7 @@ void Foam::fv::turbulenceForcing::saveState() const
             << ": energy and power one step before this time" << nl;
         os.writeEntry("k", kOld_);
         os.writeEntry("power", powerOld_);
-        os.writeEntry("deltaT", deltaTOld_);
+        os.writeEntry("deltaT", mesh_.time().deltaTValue());
         writeState(os);
     }
     mv(path + ".part", path);
@@ -210,27 +206,46 @@ void Foam::fv::turbulenceForcing::writeRow
 }
 
 
-void Foam::fv::turbulenceForcing::beginStep(const volVectorField& U)
+void Foam::fv::turbulenceForcing::report
+(
+    const scalar time,
+    const flowStatistics& now,
+    const scalar power
+)
 {
-    const scalar deltaT = mesh_.time().deltaTValue();
-    nu_ = kinematicViscosity(mesh_);
-    const flowStatistics now(U, nu_);
-
     if (!std::isfinite(now.k))
     {
         FatalErrorInFunction
             << "the velocity is not finite (k = " << now.k << ") at time "
-            << mesh_.time().value() - deltaT << exit(FatalError);
+            << time << exit(FatalError);
     }
 
-    const scalar powerNow = power(U, now);
-    writeRow(mesh_.time().value() - deltaT, now, powerNow);
-    choose(now);
+    writeRow(time, now, power);
+}
 
+
+void Foam::fv::turbulenceForcing::keep
+(
+    const flowStatistics& now,
+    const scalar power
+)
+{
     kOld_ = now.k;
-    powerOld_ = powerNow;
-    deltaTOld_ = deltaT;
+    powerOld_ = power;
+    deltaTOld_ = mesh_.time().deltaTValue();
     hasOld_ = true;
+}
+
+
+void Foam::fv::turbulenceForcing::beginStep(const volVectorField& U)
+{
+    nu_ = kinematicViscosity(mesh_);
+    const flowStatistics now(U, nu_);
+    const scalar powerNow = power(U, now);
+
+    report(mesh_.time().value() - mesh_.time().deltaTValue(), now, powerNow);
+    choose(now);
+    keep(now, powerNow);
 }
 
 
@@ -261,6 +276,39 @@ void Foam::fv::turbulenceForcing::addSup
 }
 
 
+void Foam::fv::turbulenceForcing::beginRate(const flowStatistics& now)
+{
+    first_ = (timeIndex_ != mesh_.time().timeIndex());
+    now_ = now;
+
+    if (first_)
+    {
+        timeIndex_ = mesh_.time().timeIndex();
+        nu_ = kinematicViscosity(mesh_);
+
+        // of the step that has ended; after a restart it is that of the state
+        if (explicit_)
+        {
+            deltaTOld_ = mesh_.time().deltaTValue();
+        }
+        explicit_ = true;
+        choose(now);
+    }
+    follow(now);
+}
+
+
+void Foam::fv::turbulenceForcing::endRate()
+{
+    if (first_)
+    {
+        const scalar powerNow = power(now_);
+        report(mesh_.time().value(), now_, powerNow);
+        keep(now_, powerNow);
+    }
+}
+
+
 void Foam::fv::turbulenceForcing::correct(volVectorField& U)
 {
     if (mesh_.time().writeTime())
@@ -271,7 +319,7 @@ void Foam::fv::turbulenceForcing::correct(volVectorField& U)
     // No step follows the last one, in which its row would be written. The
     // last call in a step cannot be told, so each replaces the one before.
     const Time& time = mesh_.time();
-    if (time.value() > time.endTime().value() - 0.5*time.deltaTValue())
+    if (!explicit_ && time.value() > time.endTime().value() - 0.5*time.deltaTValue())
     {
         rowTime_ = time.value();
         row_.reset(new flowStatistics(U, nu_));

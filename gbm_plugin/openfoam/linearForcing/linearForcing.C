@@ -85,6 +85,12 @@ Foam::scalar Foam::fv::linearForcing::power
     const flowStatistics& s
 ) const
 {
+    return power(s);
+}
+
+
+Foam::scalar Foam::fv::linearForcing::power(const flowStatistics& s) const
+{
     return 2*s.k*coefficient(s.k);
 }
 
@@ -92,6 +98,12 @@ Foam::scalar Foam::fv::linearForcing::power
 void Foam::fv::linearForcing::choose(const flowStatistics& now)
 {
     A_ = coefficient(energyAtForce(now.k));
+}
+
+
+void Foam::fv::linearForcing::follow(const flowStatistics& now)
+{
+    A_ = coefficient(now.k);
 }
 
 
@@ -107,6 +119,24 @@ void Foam::fv::linearForcing::add(fvMatrix<vector>& eqn) const
     {
         diag[celli] += A_*V[celli];
         source[celli] += A_*V[celli]*mean;
+    }
+}
+
+
+void Foam::fv::linearForcing::addRate(const latticeLayer& layer)
+{
+    for (direction c = 0; c < vector::nComponents; ++c)
+    for (label y = 0; y < layer.n.y(); ++y)
+    {
+        const double* __restrict__ u = layer.velocity[c] + y*layer.stride;
+        double* __restrict__ rate = layer.rate[c] + y*layer.n.x();
+        const scalar A = A_;
+        const scalar mean = shown().mean[c];
+
+        for (label x = 0; x < layer.n.x(); ++x)
+        {
+            rate[x] += A*(u[x] - mean);
+        }
     }
 }
 
@@ -144,11 +174,17 @@ void Foam::fv::linearForcing::removeMean
 
 void Foam::fv::linearForcing::correct(volVectorField& U)
 {
-    const vector mean(flowStatistics::average(U));
+    const scalar small = meanTolerance*Foam::sqrt(energy());
 
-    if (mag(mean) > meanTolerance*Foam::sqrt(energy()))
+    // the step of an explicit solver has kept that of the state
+    if (!isExplicit() || mag(shown().mean) > small)
     {
-        removeMean(U, mean);
+        const vector mean(flowStatistics::average(U));
+
+        if (mag(mean) > small)
+        {
+            removeMean(U, mean);
+        }
     }
     turbulenceForcing::correct(U);
 }
