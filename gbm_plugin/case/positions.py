@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import read_array
+
 TOUCHING = 1e-6  # largest relative difference of a bead spacing from 2a that double precision may have
 
 
@@ -13,8 +15,8 @@ def read_positions(path: Path) -> np.ndarray:
     """(fibers, beads, 3) [m] of a .npy file, neighbours one diameter apart. ValueError in words that follow the
     file's name. Spacings of single precision are made even, around the same centres and along the same links."""
     try:
-        given = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+        given = read_array(path)
+    except ValueError as error:
         raise ValueError(f"cannot be read as a NumPy .npy file: {error}") from None
     if not isinstance(given, np.ndarray) or given.dtype.kind not in "fiu":
         raise ValueError("does not hold one array of real numbers (np.save of bead centres)")

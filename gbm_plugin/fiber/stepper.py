@@ -17,6 +17,7 @@ from .layout import bead_positions, pack, unpack
 from .model import MotionOptions
 from .rates import material
 from .simd import LANES
+from .state import check_state
 from .strain import with_strain
 from .threads import COPYING, available, in_shares
 
@@ -292,12 +293,8 @@ class Stepper:
         return {**own, **self._ambient.state()}
 
     def restore(self, state) -> None:
-        """Take back what state() gave; ValueError if it is of other fibers."""
-        shape = (self.fibers.count, 3 * self.fibers.beads)
-        if np.shape(state["links_and_centres"]) != shape:
-            raise ValueError(
-                f"state holds links of shape {np.shape(state['links_and_centres'])}; these fibers need {shape}"
-            )
+        """Take back what state() gave; ValueError if it is not of these fibers, or none at all."""
+        check_state(state, self.fibers.count, self.fibers.beads)
         self.time = float(state["time"])
         pack(state["links_and_centres"], self._state)
         pack(state["multipliers"], self._multipliers)

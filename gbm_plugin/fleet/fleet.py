@@ -5,17 +5,18 @@ from __future__ import annotations
 import io
 import json
 import logging
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from ..arrays import check_arrays, read_arrays
 from ..case.layout import STATE_FILE, fiber_state
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
 from ..errors import CaseError, PredictionError, StateError
 from ..fiber import Fibers, Stepper, merged_states, prepare
+from ..fiber.state import check_state, forms
 from ..files import replaced
 from ..sampling import NEEDS, rotation_of
 from ..statistics.fibers import end_to_end_squared_ratio
@@ -24,6 +25,14 @@ log = logging.getLogger(__name__)
 
 # prediction gap over the rms velocity at the beads: worth a word, and too much to go on with
 GAP_WARNING, GAP_LIMIT = 0.1, 1.0
+
+HEADER = {
+    "signature": ("U", ()),
+    "step": ("i", ()),
+    "time": ("f", ()),
+}  # of a state file, beside the families
+MOST_NUMBERS = 64  # of an array for each bead: 4 samples of velocity and rotation have 24
+SMALL = 1 << 16  # arrays of so many bytes are read, whatever they are
 
 
 def prepare_kernels(families: Sequence[Family]) -> None:
@@ -178,8 +187,8 @@ class Fleet:
         paths = fiber_state(folder)
         if not paths:
             raise StateError(f"{folder} holds no complete fiber state")
-        states = [self._read_state(path) for path in paths]
         shares = all_shares(len(paths))
+        states = [self._read_state(path, share) for path, share in zip(paths, shares, strict=True)]
         for family, stepper in zip(self.families, self.steppers, strict=True):
             end = family.first + family.count
             parts = [share.part(family.total) for share in shares]
@@ -192,12 +201,14 @@ class Fleet:
             except (KeyError, ValueError) as error:
                 raise StateError(f"the fiber state {paths[held[0]]} cannot be read: {error}") from None
 
-    def _read_state(self, path: Path) -> dict[str, np.ndarray]:
+    def _read_state(self, path: Path, share: Share) -> dict[str, np.ndarray]:
+        """The arrays of the file of a daemon, checked."""
         try:
-            with np.load(path) as data:
-                state = {key: data[key] for key in data.files}
+            names = [*HEADER, *(f"{family.name}/{key}" for family in self.families for key in forms(1, 2))]
+            state = read_arrays(path, names, 8 * MOST_NUMBERS * self._largest + SMALL)
+            check_arrays(state, HEADER)
             signature = str(state["signature"])
-        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        except ValueError as error:
             raise StateError(f"the fiber state {path} cannot be read: {error}") from None
         if signature != self._signature():
             raise StateError(
@@ -205,7 +216,20 @@ class Fleet:
                 f"constant/fiberProperties says {self._signature()}: "
                 "restore the dictionary, or start afresh"
             )
+        for family in self.families:
+            part = share.part(family.total)
+            try:
+                check_state(_of_family(state, family.name), part.stop - part.start, family.beads)
+            except ValueError as error:
+                raise StateError(
+                    f"the fiber state {path} cannot be read: family {family.name}: {error}"
+                ) from None
         return state
+
+    @property
+    def _largest(self) -> int:
+        """Beads of the largest family."""
+        return max(family.total * family.beads for family in self.families)
 
 
 def _of_family(state: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:

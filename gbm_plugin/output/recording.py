@@ -204,8 +204,9 @@ class _File:
         most = max(SMALL, DENSITY * self.path.stat().st_size)  # what it may hold, compressed or not [bytes]
         self.times = _numbers(self.file, "time", 1, most)
         self.steps = _numbers(self.file, "step", 1, most)
-        if len(self.steps) != len(self.times) or (np.diff(self.times) <= 0).any():
-            raise ValueError(f"{len(self.times)} times that do not increase, or not {len(self.steps)}")
+        increasing = all((np.diff(values) > 0).all() for values in (self.times, self.steps))
+        if len(self.steps) != len(self.times) or not increasing:
+            raise ValueError(f"its {len(self.times)} times or {len(self.steps)} steps do not increase")
         self.box_origin, self.box_size = (
             _numbers(self.file, name, 1, most) for name in ("box_origin", "box_size")
         )

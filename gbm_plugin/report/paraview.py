@@ -17,6 +17,8 @@ from ..output.recording import Recording
 from ..statistics.fibers import curvature
 from .vtp import Polylines, write_vtp
 
+FAR, LONG = 1e9, 1e3  # no bead is so many boxes away, and no link is so many long
+
 
 def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Path:
     """Write all times of a recording as moving polylines; returns the .pvd to open. ParaView's filter Tube, with
@@ -128,6 +130,10 @@ def cut_at_faces(chains: NDArray, origin: ArrayLike, size: ArrayLike) -> tuple[N
     beads = chains.shape[1]
     scaled = (chains[..., :3] - origin) / size
     start, end = scaled[:, :-1].reshape(-1, 3), scaled[:, 1:].reshape(-1, 3)
+    if not (np.abs(scaled).max() < FAR and np.abs(end - start).max() < LONG):
+        raise ValueError(
+            "a recording has beads that are nowhere near its box, or near each other: it was damaged"
+        )
     # cuts: link, and where in it, for every plane of the lattice that lies strictly between its ends
     links, fractions = [np.empty(0, dtype=np.intp)], [np.empty(0)]
     for axis in range(3):

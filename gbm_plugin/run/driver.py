@@ -52,8 +52,8 @@ class Carrier:
     def save(self, folder: Path) -> None:
         """What a restart needs, into a time folder."""
 
-    def restore(self, folder: Path) -> None:
-        """Continue from what save wrote. CaseError where it is not of this flow."""
+    def restore(self, folder: Path, time: float) -> None:
+        """Continue from what save wrote at this time. CaseError or StateError where it is not of this flow."""
 
     def close(self) -> None:
         """The tables."""
@@ -86,7 +86,7 @@ class Run:
         self.fleet = Fleet.seeded(scene, scene.origin, np.add(scene.origin, scene.box), start.time)
         if start.continues:
             folder = scene.case / _name(start.time)
-            carrier.restore(folder)
+            carrier.restore(folder, start.time)
             self.fleet.restore(folder)
             log.info("flow and fibers continue from %s", folder / STATE_FILE)
         name = _name(start.time)

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import check_arrays, read_arrays
 from ..case.initial import read_initial_field
 from ..case.layout import flow_table, results
 from ..case.scene import Forcing, Scene
 from ..case.times import choose_start
-from ..errors import CaseError
+from ..errors import CaseError, StateError
 from ..files import created, replaced
 from ..output.restarts import keep_earlier
 from ..scales import kolmogorov_length, taylor_reynolds
@@ -28,6 +29,7 @@ from .driver import COMPLETE, Carrier, Run, results_folder
 log = logging.getLogger(__name__)
 
 FLOW_FILE = "uniform/flow.npz"
+SMALL = 1 << 20  # arrays of so many bytes are read, whatever they are
 COLUMNS = (
     *("Time", "k", "epsilonBudget", "epsilonGradient", "epsilonLaplacian", "uPrime", "ReLambda", "eta"),
     *("A", "power", "meanUx", "meanUy", "meanUz"),
@@ -147,15 +149,18 @@ class _SpectralFlow(Carrier):
         with replaced(path, "wb") as file:
             np.savez(file, before=self.before, **self.solver.state())
 
-    def restore(self, folder: Path) -> None:
+    def restore(self, folder: Path, time: float) -> None:
         path = folder / FLOW_FILE
+        forms = self.solver.forms()
         try:
-            with np.load(path) as data:
-                state = {name: data[name] for name in data.files}
-        except (OSError, ValueError) as error:
-            raise CaseError(f"the state of the flow {path} cannot be read: {error}") from None
-        self.now = tuple(state.pop("before"))  # the row of this time is made again
-        self.solver.restore(state)
+            state = read_arrays(path, [*forms, "before"], max(self.solver.coefficients.nbytes, SMALL))
+            check_arrays(state, {"before": ("f", (2,))})
+            self.now = tuple(state.pop("before").tolist())  # the row of this time is made again
+            self.solver.restore(state)
+            if abs(self.solver.time - time) > 0.5 * self.scene.time_step:
+                raise ValueError(f"it is of time {self.solver.time:g}, not {time:g}")
+        except (KeyError, ValueError) as error:
+            raise StateError(f"the state of the flow {path} cannot be continued from: {error}") from None
 
     def close(self) -> None:
         self.table.close()

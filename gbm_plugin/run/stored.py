@@ -15,7 +15,7 @@ import numpy as np
 
 from ..case.scene import Scene
 from ..case.times import choose_start
-from ..errors import CaseError
+from ..errors import CaseError, StateError
 from ..files import write_text
 from ..flow import StoredFlow, hdf5_flow
 from ..flow.grid import WORDS
@@ -26,6 +26,7 @@ from .driver import COMPLETE, Carrier, Run, results_folder
 log = logging.getLogger(__name__)
 
 SOURCE_FILE = "uniform/stored.json"
+MOST = 1 << 16  # characters of it
 
 
 def run_stored(
@@ -122,12 +123,15 @@ class _Stored(Carrier):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, json.dumps(self.source, indent=2) + "\n")
 
-    def restore(self, folder: Path) -> None:
+    def restore(self, folder: Path, time: float) -> None:
         path = folder / SOURCE_FILE
         try:
-            earlier = json.loads(path.read_text())
-        except (OSError, ValueError) as error:
-            raise CaseError(f"{path} cannot be read: {error}") from None
+            with path.open() as file:
+                earlier = json.loads(file.read(MOST))
+            if not isinstance(earlier, dict):
+                raise ValueError("it holds no entries")
+        except (OSError, ValueError, RecursionError) as error:
+            raise StateError(f"{path} cannot be read: {error}") from None
         for name, value in self.source.items():
             if earlier.get(name) != value:
                 raise CaseError(

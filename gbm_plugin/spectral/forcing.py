@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gbm_plugin.arrays import Form
 from gbm_plugin.spectral.arrays import Array, Arrays
 from gbm_plugin.spectral.normals import normals
 
@@ -37,6 +38,10 @@ class Forcing:
 
     def state(self) -> dict[str, Value]:
         """All that a bitwise restart needs."""
+        return {}
+
+    def forms(self) -> dict[str, Form]:
+        """What `state` holds."""
         return {}
 
     def restore(self, state: dict[str, Value]) -> None:
@@ -136,11 +141,16 @@ class EswaranPope(Forcing):
     def state(self) -> dict[str, Value]:
         return {"amplitudes": self._b.copy(), "draws": float(self.draws)}
 
+    def forms(self) -> dict[str, Form]:
+        return {"amplitudes": ("c", self._b.shape), "draws": ("f", ())}
+
     def restore(self, state: dict[str, Value]) -> None:
-        amplitudes = np.asarray(state["amplitudes"])
+        amplitudes, draws = np.asarray(state["amplitudes"]), float(state["draws"])
         if amplitudes.shape != self._b.shape:
             raise ValueError(f"the stored force has {len(amplitudes)} modes, this one {len(self._b)}")
-        self._b, self.draws = amplitudes.copy(), int(state["draws"])
+        if not 0 <= draws < 2**53 or draws != int(draws):
+            raise ValueError(f"the stored force has drawn {draws} times")
+        self._b, self.draws = amplitudes.copy(), int(draws)
 
     def _stored(self) -> NDArray:
         """The force (3, M') at the modes that the solver stores."""

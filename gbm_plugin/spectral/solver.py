@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gbm_plugin.arrays import Form, check_arrays
 from gbm_plugin.sampling import NEEDS, one_of
 from gbm_plugin.spectral import interpolation as interpolate
 from gbm_plugin.spectral.arrays import Array, Arrays
@@ -193,20 +194,45 @@ class SpectralSolver:
         forcing = {f"forcing_{name}": value for name, value in self.forcing.state().items()}
         return own | self._stepper.state() | forcing
 
+    def forms(self) -> dict[str, Form]:
+        """What `state` holds: number type and shape of each array, of which those of slopes may be missing."""
+        field = (self._u.dtype.str[1:], self._u.shape)
+        own = {"coefficients": field} | {name: ("f", ()) for name in ("energy", "time", "step")}
+        forcing = {f"forcing_{name}": form for name, form in self.forcing.forms().items()}
+        return own | self._stepper.forms(field) | forcing
+
     def restore(self, state: dict[str, NDArray | float]) -> None:
-        """Continue from the `state()` of a solver that was built from the same values."""
-        coefficients = np.asarray(state["coefficients"])
+        """Continue from the `state()` of a solver that was built from the same values. ValueError where it is none:
+        also for a velocity that is not solenoidal or has another energy than it says."""
+        state = {name: np.asarray(value) for name, value in state.items()}
+        coefficients = state["coefficients"]
         if coefficients.shape != self._u.shape or coefficients.dtype != self._u.dtype:
             stored, own = (f"{a.dtype}{a.shape}" for a in (coefficients, self._u))
             raise ValueError(
                 f"the stored velocity is {stored}, this solver's {own}: cells and precision must agree"
             )
+        forms = self.forms()
+        check_arrays(state, forms, [name for name in forms if name.startswith("slope_")])
         self._u = self.operators.xp.array(coefficients)
-        self._energy, self.time, self.step = float(state["energy"]), float(state["time"]), int(state["step"])
+        self._energy, self.time, self.step = (float(state[name]) for name in ("energy", "time", "step"))
+        self._check_flow()
+        self.step = int(self.step)
         self._stepper.restore(state)
         prefix = "forcing_"
         self.forcing.restore({k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)})
         self._discard_fields()
+
+    def _check_flow(self) -> None:
+        u, rounding = self._u, 1e3 * np.finfo(self._u.dtype).eps
+        off = self.operators.project(u) - u
+        off[:, 0, 0, 0] = 0
+        energy = self.operators.energy(u)
+        if abs(off).max() > rounding * abs(u).max() or abs(energy - self._energy) > rounding * energy:
+            raise ValueError(
+                f"the stored velocity is not solenoidal, or its energy of {energy:g} is not the {self._energy:g} said"
+            )
+        if self.step < 0 or self.step != int(self.step):
+            raise ValueError(f"the stored step is {self.step}")
 
     def _evaluate(self, u: Array, out: Array, energy: float) -> None:
         """du/dt without viscosity."""

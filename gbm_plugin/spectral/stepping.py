@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from gbm_plugin.arrays import Form
 from gbm_plugin.spectral.arrays import Array, Arrays
 
 Evaluate = Callable[[Array, Array, float], None]  # (u, out, fluctuation energy of u): du/dt without viscosity
@@ -33,6 +34,9 @@ class RungeKutta4:
         """Nothing is kept from step to step."""
 
     def state(self) -> dict[str, NDArray]:
+        return {}
+
+    def forms(self, field: Form) -> dict[str, Form]:
         return {}
 
     def restore(self, state: dict[str, NDArray]) -> None:
@@ -72,7 +76,15 @@ class AdamsBashforth3:
         slopes = [self._operators.host(s).copy() for s in self._slopes]
         return {f"slope_{i}": s for i, s in enumerate(slopes)} | {"slope_times": np.array(self._times)}
 
+    def forms(self, field: Form) -> dict[str, Form]:
+        """What `state` can hold for fields of this form."""
+        return {f"slope_{i}": field for i in range(3)} | {"slope_times": ("f", (range(4),))}
+
     def restore(self, state: dict[str, NDArray]) -> None:
+        """ValueError where a slope is missing, or their times do not fall."""
+        times, present = state["slope_times"], [f"slope_{i}" in state for i in range(3)]
+        if present != [i < len(times) for i in range(3)] or (np.diff(times) >= 0).any():
+            raise ValueError(f"there are {sum(present)} slopes, and their times are {times}")
         self._times = np.asarray(state["slope_times"]).tolist()
         xp = self._operators.xp
         self._slopes = [xp.array(state[f"slope_{i}"]) for i in range(len(self._times))]
