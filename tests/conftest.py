@@ -53,6 +53,14 @@ def set_entry(path: Path, name: str, value: str) -> None:
     path.write_text(text)
 
 
+def set_families(case: Path, words: str) -> None:
+    """Replace the fibers of a case."""
+    path = case / "constant/fiberProperties"
+    head, found, _ = path.read_text().partition("families")
+    assert found
+    path.write_text(f"{head}families {{ {words} }}\n")
+
+
 def make_case(
     path: Path,
     *,

@@ -58,6 +58,6 @@ def test_stacks_of_a_solver_and_a_daemon(tmp_path):
     until(lambda: "Starting time loop" in (other / "log.pimpleFoam").read_text(), "the solver's start")
     text = stacks()
     assert daemon.wait() == -signal.SIGABRT and solver.wait() != 0
-    assert "in accept" in text and "coupling/sockets.py" in text
+    assert "in greet" in text and "coupling/sockets.py" in text
     assert "Foam::sigQuit::sigHandler" in text and "pimpleFoam -case" in text
     assert "test_stacks_of_a_solver_and_a_daemon" in text

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import CouplingError
-from .message import HEADER_SIZE, MAX_TEXT, Kind, Message, ProtocolError, decode_header, encode_header
+from .message import HEADER_SIZE, MAX_TEXT, Hello, Kind, Message, ProtocolError, decode_header, encode_header
 
 
 class Channel(ABC):
@@ -15,7 +16,6 @@ class Channel(ABC):
 
     def __init__(self, timeout: float, log: Path):
         self.timeout = timeout
-        self.greeted = False  # the other side has shown that it is the solver of this case
         self._log = log
 
     @abstractmethod
@@ -40,8 +40,13 @@ class Channel(ABC):
             raise self.error(str(error)) from None
         message = Message(head.kind, head.step, head.time, self._read(size), head.flags)
         if message.kind is Kind.ERROR:
-            raise self.error(f"OpenFOAM stopped: {bytes(message.payload).decode(errors='replace')}")
+            raise self.error(f"OpenFOAM stopped: {message.text()}")
         return message
+
+    def say_why(self, text: str) -> None:
+        """A last word to the solver, which may be gone: then nobody is left to tell."""
+        with contextlib.suppress(CouplingError):
+            self.send(Message(Kind.ERROR, 0, 0.0, text.encode()[:MAX_TEXT]))
 
     def error(self, what: str) -> CouplingError:
         return CouplingError(f"{what} (OpenFOAM's log: {self._log})")
@@ -55,11 +60,10 @@ class Channel(ABC):
 class Listener(ABC):
     """Where one solver can find the daemon. A context manager that leaves nothing behind."""
 
-    token = ""  # what the solver must know where others can reach this place
-
     @abstractmethod
-    def accept(self, give_up: Callable[[], bool]) -> Channel | None:
-        """Wait for the solver, as long as it takes; None when `give_up` says so."""
+    def greet(self, give_up: Callable[[], bool]) -> tuple[Channel, Message, Hello] | None:
+        """Wait for the solver, as long as it takes: its channel, and the HELLO that it said; None when `give_up`
+        says so. CouplingError where something else has come that nobody but the user can have sent."""
 
     @abstractmethod
     def close(self) -> None: ...

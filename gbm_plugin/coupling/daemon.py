@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import secrets
 import signal
 import threading
 import time as clock
@@ -26,7 +25,7 @@ from ..case.trust import check_case
 from ..errors import CaseError, CouplingError, StateError
 from ..fleet.fleet import Fleet, prepare_kernels
 from ..fleet.journal import Journal
-from .channel import Channel, Listener
+from .channel import Channel
 from .listen import listen
 from .message import (
     PROVISIONAL,
@@ -44,7 +43,6 @@ from .message import (
 
 log = logging.getLogger(__name__)
 
-HELLO_TIMEOUT = 5.0  # a solver says HELLO at once [s]
 WAIT_INTERVAL = 2.0  # between words to a solver that waits for WELCOME [s]; shorter than any timeout of use
 
 
@@ -67,17 +65,16 @@ def serve(case: Path | str, number: int | None = None) -> None:
         listen(case, scene.coupling, solver_log, share) as listener,
     ):
         log.info("waiting for OpenFOAM (%s)", scene.coupling.transport)
-        while (channel := listener.accept(give_up=lambda: bool(stop))) is not None:
-            try:
-                if (first := _greeted(channel, listener)) is not None:
-                    Session(scene, share, channel, stop).run(*first)
-                    return
-            except Exception as error:
-                _say_why(channel, str(error))
-                raise
-            finally:
-                channel.close()
-        raise CouplingError("stopped before OpenFOAM came")
+        if (greeted := listener.greet(give_up=lambda: bool(stop))) is None:
+            raise CouplingError("stopped before OpenFOAM came")
+        channel, *first = greeted
+        try:
+            Session(scene, share, channel, stop).run(*first)
+        except Exception as error:
+            channel.say_why(str(error))
+            raise
+        finally:
+            channel.close()
 
 
 def _share(scene: Scene, number: int | None) -> Share:
@@ -91,29 +88,6 @@ def _share(scene: Scene, number: int | None) -> Share:
             f"--share {number}: {scene.case}/constant/fiberProperties has daemons {daemons}; allowed: 1 ... {daemons}"
         )
     return Share(number or 1, daemons)
-
-
-def _greeted(channel: Channel, listener: Listener) -> tuple[Message, Hello] | None:
-    """The HELLO of the solver; None for a stranger, of whom a port that others can reach must not die."""
-    timeout, channel.timeout = channel.timeout, min(channel.timeout, HELLO_TIMEOUT)
-    try:
-        message = channel.receive()
-        if message.kind is not Kind.HELLO:
-            raise channel.error(f"received {message.kind.name} where HELLO must come")
-        try:
-            hello = Hello.decode(message.payload)
-        except ProtocolError as error:
-            raise channel.error(str(error)) from None
-        if not secrets.compare_digest(hello.token.encode(), listener.token.encode()):
-            raise channel.error("the solver that connected has not the token of this daemon")
-    except CouplingError as error:
-        if not listener.token:
-            raise
-        log.warning("refused a connection: %s", error)
-        _say_why(channel, str(error))
-        return None
-    channel.timeout, channel.greeted = timeout, True
-    return message, hello
 
 
 class _StopFlag:
@@ -132,11 +106,6 @@ class _StopFlag:
 
     def __bool__(self) -> bool:
         return self._set
-
-
-def _say_why(channel: Channel, text: str) -> None:
-    with contextlib.suppress(CouplingError):  # the solver may be gone: nobody is left to tell
-        channel.send(Message(Kind.ERROR, 0, 0.0, text.encode()))
 
 
 @contextlib.contextmanager

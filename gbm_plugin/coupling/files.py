@@ -14,7 +14,8 @@ from ..case.share import Share
 from ..errors import CouplingError
 from ..files import private_folder, replaced
 from .channel import Channel, Listener
-from .message import HEADER_SIZE, MAX_TEXT, Message
+from .greeting import greeting
+from .message import HEADER_SIZE, MAX_TEXT, Hello, Message, ProtocolError
 from .sockets import POLL, write_secret
 
 # messages of an earlier session, whole or not; not `session`, which is replaced: a solver may be waiting with it
@@ -97,13 +98,22 @@ class FileListener(Listener):
             raise CouplingError(f"cannot use {error.filename or self.folder}: {error.strerror}") from None
         write_secret(self.folder / "session", self.session + "\n")
 
-    def accept(self, give_up: Callable[[], bool]) -> Channel | None:
+    def greet(self, give_up: Callable[[], bool]) -> tuple[Channel, Message, Hello] | None:
         channel = FileChannel(self.folder, self.session, self.timeout, self.log)
-        while not give_up():
-            if channel.incoming().exists():
-                return channel
+        while not channel.incoming().exists():
+            if give_up():
+                return None
             time.sleep(POLL / 10)
-        return None
+        dialogue = greeting(token="")
+        next(dialogue)
+        try:
+            dialogue.send(channel.receive())
+        except StopIteration as end:
+            return channel, *end.value
+        except (ProtocolError, CouplingError) as error:
+            channel.say_why(str(error))
+            raise channel.error(str(error)) if isinstance(error, ProtocolError) else error from None
+        raise AssertionError("nobody else reads this folder: HELLO is enough")
 
     def close(self) -> None:
         with contextlib.suppress(OSError):

@@ -14,7 +14,8 @@ from ..case.share import Share
 from ..sampling import NEEDS
 
 MAGIC = b"GBMC"
-VERSION = 2
+VERSION = 3
+NONCE_SIZE = 32  # a random number that shows that a connection is no repetition [bytes]
 MAX_TEXT = 65536  # longest payload of all but POSITIONS and SAMPLE [bytes]
 
 _HEADER = struct.Struct("<4sHHIIqdQ")
@@ -34,6 +35,8 @@ class Kind(enum.IntEnum):
     GOODBYE = 7  # fibers -> flow: everything is on disk
     ERROR = 8  # either way: one line, then the connection ends
     WAIT = 9  # fibers -> flow: one line, why WELCOME takes longer
+    CHALLENGE = 10  # fibers -> flow: a random number, and who asks
+    PROOF = 11  # flow -> fibers: who answers
 
 
 class ProtocolError(Exception):
@@ -51,6 +54,11 @@ class Message:
     def encode(self) -> bytes:
         return encode_header(self) + bytes(self.payload)
 
+    def text(self) -> str:
+        """The payload as one line to be printed, whatever was sent."""
+        text = bytes(self.payload[:1000]).decode(errors="replace")
+        return "".join(c if c.isprintable() else "?" for c in text)
+
 
 def encode_header(m: Message) -> bytes:
     return _HEADER.pack(MAGIC, VERSION, m.kind, m.flags, 0, m.step, m.time, len(m.payload))
@@ -63,7 +71,7 @@ def decode_header(data: bytes, most: int = MAX_TEXT) -> tuple[Message, int]:
     """
     if len(data) != HEADER_SIZE:
         raise ProtocolError(f"short message: {len(data)} bytes where a header has {HEADER_SIZE}")
-    magic, version, kind, flags, _, step, time, size = _HEADER.unpack(data)
+    magic, version, kind, flags, reserved, step, time, size = _HEADER.unpack(data)
     if magic != MAGIC:
         raise ProtocolError("what arrived is not a message of a gbm plugin")
     if version != VERSION:
@@ -73,6 +81,10 @@ def decode_header(data: bytes, most: int = MAX_TEXT) -> tuple[Message, int]:
         )
     if kind not in Kind.__members__.values():
         raise ProtocolError(f"message of unknown kind {kind}")
+    if flags & ~(PROVISIONAL | STOP if kind == Kind.POSITIONS else 0):
+        raise ProtocolError(f"{Kind(kind).name} has unknown flags: {flags}")
+    if reserved:
+        raise ProtocolError(f"{Kind(kind).name} has {reserved} where 0 is reserved")
     if size > max(most, MAX_TEXT):
         raise ProtocolError(f"{Kind(kind).name} announces {size} bytes where at most {most} are expected")
     if not math.isfinite(time):
@@ -83,7 +95,7 @@ def decode_header(data: bytes, most: int = MAX_TEXT) -> tuple[Message, int]:
 @dataclass(frozen=True)
 class Hello:
     """The values that OpenFOAM runs with, and which of the daemons it takes this one for. SI units; folder: of the
-    start time, relative to the case."""
+    start time, relative to the case; nonce: a random number of the solver's."""
 
     viscosity: float
     time_step: float
@@ -92,18 +104,14 @@ class Hello:
     cells: int
     share: Share
     folder: str
-    token: str
+    nonce: bytes
 
     _FIXED = struct.Struct("<9d3q")
 
     def encode(self) -> bytes:
         folder = self.folder.encode()
         values = (self.viscosity, self.time_step, *self.box_min, *self.box_max, float(self.cells))
-        return (
-            self._FIXED.pack(*values, self.share.number, self.share.of, len(folder))
-            + folder
-            + self.token.encode()
-        )
+        return self._FIXED.pack(*values, self.share.number, self.share.of, len(folder)) + folder + self.nonce
 
     @classmethod
     def decode(cls, payload: bytes) -> Hello:
@@ -111,17 +119,22 @@ class Hello:
         if len(payload) < size:
             raise ProtocolError(f"HELLO has {len(payload)} bytes: at least {size} are needed")
         *values, number, of, length = cls._FIXED.unpack(payload[:size])
-        if not all(map(math.isfinite, values)) or not 0 <= length <= len(payload) - size:
-            raise ProtocolError("HELLO holds values that are not finite, or a folder that is cut off")
-        folder = decode_folder(payload[size : size + length])
-        try:
-            token = payload[size + length :].decode()
-        except UnicodeDecodeError:
-            raise ProtocolError("HELLO holds a token that is not UTF-8") from None
+        if not all(map(math.isfinite, values)) or length != len(payload) - size - NONCE_SIZE:
+            raise ProtocolError("HELLO holds values that are not finite, or is of the wrong length")
+        folder = decode_folder(bytes(payload[size:-NONCE_SIZE]))
         if not 1 <= number <= of:
             raise ProtocolError(f"HELLO is for daemon {number} of {of}")
         low, high = tuple(values[2:5]), tuple(values[5:8])
-        return cls(values[0], values[1], low, high, int(values[8]), Share(number, of), folder, token)
+        return cls(
+            values[0],
+            values[1],
+            low,
+            high,
+            int(values[8]),
+            Share(number, of),
+            folder,
+            bytes(payload[-NONCE_SIZE:]),
+        )
 
 
 def decode_folder(data: bytes) -> str:

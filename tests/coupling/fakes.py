@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hmac
 import os
 import re
+import secrets
 import signal
 import socket
 import subprocess
@@ -18,11 +20,20 @@ from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.share import Share
 from gbm_plugin.coupling.listen import listen
-from gbm_plugin.coupling.message import Hello, Kind, Message, encode_array, encode_header, encode_welcome
+from gbm_plugin.coupling.message import (
+    NONCE_SIZE,
+    Hello,
+    Kind,
+    Message,
+    encode_array,
+    encode_header,
+    encode_welcome,
+)
 
 from conftest import start_solver
 
 BOX = 2 * np.pi
+FAMILIES = [(12, 6, 0)]  # of conftest.FAMILY
 PATIENCE = 60  # s, beyond any timeout of these tests
 ADDRESSES = {"socket": "gbm.sock", "tcp": "gbm.tcp", "file": "exchange/session"}
 
@@ -109,15 +120,23 @@ class FakeSolver:
         """Where the daemon can be found."""
         return self.case / ADDRESSES[self.scene.coupling.transport]
 
-    def connect(self, **changes) -> None:
-        """The connection and HELLO, with other values where the test wants them."""
+    def connect(
+        self,
+        *,
+        pieces: int = 1 << 20,
+        proof: Callable[[bytes], bytes] | None = None,
+        more: bytes = b"",
+        **changes,
+    ) -> None:
+        """The connection and HELLO, with other values where the test wants them; in TCP also the proof, another one
+        where the test makes it of the challenge, and more bytes behind it. pieces: of how many bytes, in TCP."""
         transport, path = self.scene.coupling.transport, self.address
         until(lambda: path.exists() or self.daemon.poll() is not None, "the daemon's address")
-        token = ""
+        self.token = ""
         if transport == "file":
             self.socket = Files(path.parent, path.read_text().strip())
         elif transport == "tcp":
-            host, port, token = path.read_text().split()
+            host, port, self.token = path.read_text().split()
             self.socket = socket.create_connection((host, int(port)))
         else:
             self.socket = socket.socket(socket.AF_UNIX)
@@ -131,10 +150,27 @@ class FakeSolver:
             "cells": 4096,
             "share": Share(),
             "folder": "0",
-            "token": token,
+            "nonce": secrets.token_bytes(NONCE_SIZE),
         }
-        hello = Hello(**{**values, **changes}).encode()
-        self.raw(Message(Kind.HELLO, 0, 0.0, hello).encode())
+        self.token = changes.get("token", self.token)
+        hello = Message(
+            Kind.HELLO, 0, 0.0, Hello(**values | {k: v for k, v in changes.items() if k != "token"}).encode()
+        ).encode()
+        if transport != "tcp":
+            self.raw(hello)
+            return
+        for i in range(0, len(hello), pieces):
+            self.raw(hello[i : i + pieces])
+        self.challenge = self.receive()
+        nonce, code = self.challenge.payload[:NONCE_SIZE], self.challenge.payload[NONCE_SIZE:]
+        assert self.challenge.kind is Kind.CHALLENGE and len(code) == NONCE_SIZE
+        if "token" not in changes:
+            assert code == self.code(hello + nonce, "fibers")
+        answer = proof(self.challenge.payload) if proof else self.code(hello + nonce)
+        self.raw(Message(Kind.PROOF, 0, 0.0, answer).encode() + more)
+
+    def code(self, said: bytes, side: str = "flow") -> bytes:
+        return hmac.digest(self.token.encode(), side.encode() + said, "sha256")
 
     def raw(self, data: bytes) -> None:
         self.socket.sendall(data)
@@ -202,8 +238,7 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
     with listen(case, scene.coupling, case / "log.pimpleFoam") as listener:
         solver = start_solver(case)
         try:
-            channel = listener.accept(lambda: solver.poll() is not None)
-            first = channel.receive()
+            channel, first, _ = listener.greet(lambda: solver.poll() is not None)
             misbehave(channel, first, beads)
             assert solver.wait(PATIENCE) == 1
             channel.close()
@@ -215,9 +250,13 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
     return text
 
 
+def welcome() -> Message:
+    return Message(Kind.WELCOME, 0, 0.0, encode_welcome("rotation", FAMILIES))
+
+
 def greet(channel, first: Message, beads: int) -> None:
     """WELCOME, and step 0 as it should be."""
-    channel.send(Message(Kind.WELCOME, first.step, first.time, encode_welcome("rotation", [(beads, 1, 0)])))
+    channel.send(welcome())
     channel.send(positions(0, beads))
     channel.receive(1 << 20)
 

@@ -7,7 +7,6 @@ import numpy as np
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.coupling.listen import listen
 from gbm_plugin.coupling.message import (
-    Hello,
     Kind,
     Message,
     decode_sample,
@@ -15,7 +14,7 @@ from gbm_plugin.coupling.message import (
     encode_welcome,
 )
 
-from conftest import start_solver
+from conftest import set_families, start_solver
 
 
 def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
@@ -24,14 +23,14 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
     Returns what it said of itself, and {step: (time, velocity, extra)}.
     """
     scene = read_scene(case)
+    set_families(case, f"probes {{ count {len(positions)}; beads 1; }}")
     samples = {}
     solver = start_solver(case, ranks)
     try:
         with listen(case, scene.coupling, case / "log.pimpleFoam") as listener:
-            channel = listener.accept(lambda: solver.poll() is not None)
-            assert channel is not None, (case / "log.pimpleFoam").read_text()[-3000:]
-            first = channel.receive()
-            hello = Hello.decode(first.payload)
+            greeted = listener.greet(lambda: solver.poll() is not None)
+            assert greeted is not None, (case / "log.pimpleFoam").read_text()[-3000:]
+            channel, first, hello = greeted
             channel.send(
                 Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1, 0)]))
             )

@@ -16,6 +16,7 @@ from gbm_plugin.coupling.message import (
     HEADER_SIZE,
     MAX_TEXT,
     NEEDS,
+    NONCE_SIZE,
     VERSION,
     Hello,
     Kind,
@@ -32,18 +33,21 @@ from gbm_plugin.coupling.message import (
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 triple = st.tuples(finite, finite, finite)
-messages = st.builds(
-    Message,
-    st.sampled_from(Kind),
-    st.integers(-(2**63), 2**63 - 1),
-    finite,
-    st.binary(max_size=200),
-    st.integers(0, 2**32 - 1),
+messages = st.sampled_from(Kind).flatmap(
+    lambda kind: st.builds(
+        Message,
+        st.just(kind),
+        st.integers(-(2**63), 2**63 - 1),
+        finite,
+        st.binary(max_size=200),
+        st.integers(0, 3 if kind is Kind.POSITIONS else 0),
+    )
 )
 shares = st.integers(1, 2**40).flatmap(lambda of: st.builds(Share, st.integers(1, of), st.just(of)))
+nonces = st.binary(min_size=NONCE_SIZE, max_size=NONCE_SIZE)
 hellos = st.builds(
     Hello, finite, finite, triple, triple, st.integers(0, 2**50), shares,
-    st.from_regex(r"(processor[0-9]{1,4}/)?[0-9]{1,6}(\.[0-9]{1,6})?", fullmatch=True), st.text(max_size=40),
+    st.from_regex(r"(processor[0-9]{1,4}/)?[0-9]{1,6}(\.[0-9]{1,6})?", fullmatch=True), nonces,
 )  # fmt: skip
 
 
@@ -106,7 +110,10 @@ def test_welcome_is_a_list_of_integers():
         (b"HTTP" + bytes(36), "not a message of a gbm plugin"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION + 1, 1, 0, 0, 0, 0.0, 0), f"version {VERSION + 1}"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 0, 0, 0, 0, 0.0, 0), "unknown kind 0"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 10, 0, 0, 0, 0.0, 0), "unknown kind 10"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 12, 0, 0, 0, 0.0, 0), "unknown kind 12"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 3, 4, 0, 0, 0.0, 0), "POSITIONS has unknown flags: 4"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 1, 0, 0, 0.0, 0), "SAMPLE has unknown flags: 1"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 7, 0, 0.0, 0), "SAMPLE has 7 where 0 is reserved"),
         (
             b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 0, 0, 0.0, MAX_TEXT + 1),
             f"announces {MAX_TEXT + 1} bytes",
@@ -175,7 +182,7 @@ def decode_all(data: bytes) -> int:
 
 @settings(max_examples=2000, deadline=None)
 @given(st.binary(max_size=200))
-@example(Hello(1.0, 1.0, (0.0,) * 3, (1.0,) * 3, 8, WHOLE, "0", "").encode())
+@example(Hello(1.0, 1.0, (0.0,) * 3, (1.0,) * 3, 8, WHOLE, "0", bytes(32)).encode())
 def test_whatever_arrives(data):
     decode_all(data)
 
@@ -183,7 +190,9 @@ def test_whatever_arrives(data):
 def test_a_hundred_thousand_damaged_messages():
     """Valid bytes with a few of them changed, cut, doubled or inserted, which get much deeper than random ones."""
     rng = random.Random(1)
-    hello = Hello(0.01, 0.02, (0.0,) * 3, (6.28,) * 3, 4096, Share(2, 3), "processor0/0.2", "f" * 32).encode()
+    hello = Hello(
+        0.01, 0.02, (0.0,) * 3, (6.28,) * 3, 4096, Share(2, 3), "processor0/0.2", b"f" * 32
+    ).encode()
     seeds = [
         Message(Kind.HELLO, 3, 0.1, hello).encode(),
         hello,

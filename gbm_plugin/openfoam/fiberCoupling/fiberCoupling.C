@@ -179,7 +179,10 @@ void Foam::functionObjects::fiberCoupling::shakeHands
             (
                 new fiberDaemon
                 (
-                    coupling, time_.globalPath(), {daemon + 1, count}, own
+                    fiberProperties,
+                    time_.globalPath(),
+                    {daemon + 1, count},
+                    own
                 )
             );
         }

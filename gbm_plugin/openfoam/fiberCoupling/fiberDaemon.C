@@ -4,24 +4,32 @@
 
 Foam::fiberDaemon::fiberDaemon
 (
-    const dictionary& coupling,
+    const dictionary& fiberProperties,
     const fileName& caseFolder,
     const daemonShare& share,
     message hello
 )
 :
-    connection_(connection::New(coupling, caseFolder, share)),
+    connection_
+    (
+        connection::New
+        (
+            fiberProperties.subOrEmptyDict("coupling"), caseFolder, share
+        )
+    ),
+    families_(readFamilies(fiberProperties, caseFolder, share)),
     beads_(0),
     wanted_(NOTHING)
 {
-    hello.appendText(connection_->token());
+    hello.appendText(connection::nonce());
     connection_->send(hello);
+    connection_->authenticate(hello);
 
     readWelcome
     (
         connection_->receive
         (
-            message::WELCOME, hello.head.step, 40, message::maxText
+            message::WELCOME, hello.head.step, 16, message::maxText
         )
     );
 }
@@ -35,28 +43,52 @@ void Foam::fiberDaemon::readWelcome(const message& m)
     // fiber of each
     const std::vector<std::int64_t> n(m.values<std::int64_t>());
 
-    bool valid = n[0] >= NOTHING && n[0] <= GRADIENT
-     && m.payload.size() == sizeof(std::int64_t)*n.size()
-     && n.size() % 3 == 2 && n[1] == std::int64_t(n.size()/3);
-
-    std::int64_t beads = 0;
-    for (std::size_t i = 2; valid && i < n.size(); i += 3)
+    if (n[0] < NOTHING || n[0] > GRADIENT)
     {
-        valid = n[i] > 0 && n[i + 1] > 0 && n[i] <= labelMax/n[i + 1]
-         && n[i + 2] >= 0 && n[i + 2] <= labelMax - n[i];
-        if (valid)
-        {
-            beads += n[i]*n[i + 1];
-            families_.append
-            ({
-                families_.size(), label(n[i]), label(n[i + 1]), label(n[i + 2])
-            });
-        }
+        connection_->fail
+        (
+            "WELCOME asks for the unknown number " + std::to_string(n[0])
+          + " beside the velocity"
+        );
     }
-    // all that a bead is sampled for has a number
-    if (!valid || beads > labelMax/12)
+
+    std::vector<std::int64_t> ours({families_.size()});
+    std::int64_t beads = 0;
+    for (const fiberFamily& f : families_)
     {
-        connection_->fail("WELCOME holds numbers that are not allowed");
+        ours.insert(ours.end(), {f.count, f.beads, f.first});
+        beads += f.size();
+    }
+    const std::vector<std::int64_t> theirs(n.begin() + 1, n.end());
+
+    if (theirs != ours || m.payload.size() % sizeof(std::int64_t))
+    {
+        const auto text = [](const std::vector<std::int64_t>& numbers)
+        {
+            std::string s;
+            for (std::size_t i = 0; i < numbers.size() && i < 16; ++i)
+            {
+                s += (i ? " " : "") + std::to_string(numbers[i]);
+            }
+            return s;
+        };
+        connection_->fail
+        (
+            "WELCOME and constant/fiberProperties have different families"
+            " (their number; fibers, beads and first fiber of each): "
+          + text(theirs) + ", and " + text(ours)
+          + ": daemon and solver are not on the same case, or it was edited"
+            " in between"
+        );
+    }
+    if (beads > labelMax/12)
+    {
+        connection_->fail
+        (
+            std::to_string(beads) + " beads are too many for one daemon, which"
+            " can have " + std::to_string(labelMax/12) + ": see the entry"
+            " daemons of constant/fiberProperties"
+        );
     }
 
     wanted_ = ambient(n[0]);
@@ -77,8 +109,7 @@ std::uint32_t Foam::fiberDaemon::receivePositions
     const std::uint64_t size = std::uint64_t(beads_)*sizeof(point);
     const message m(connection_->receive(message::POSITIONS, step, size));
 
-    // isfinite first: comparing with NaN would raise SIGFPE
-    if (!std::isfinite(m.head.time) || mag(m.head.time - time) > tolerance)
+    if (mag(m.head.time - time) > tolerance)
     {
         connection_->fail
         (
@@ -87,7 +118,7 @@ std::uint32_t Foam::fiberDaemon::receivePositions
         );
     }
 
-    std::memcpy(positions.begin(), m.payload.data(), size);
+    std::memcpy(static_cast<void*>(positions.begin()), m.payload.data(), size);
     forAll(positions, i)
     {
         const point& p = positions[i];
@@ -171,5 +202,6 @@ void Foam::fiberDaemon::end(const label step, const scalar time)
         std::uint64_t(beads_)*sizeof(point)
     );
     connection_->receive(message::GOODBYE, step, 0);
+    connection_->finish();
     connection_.clear();
 }

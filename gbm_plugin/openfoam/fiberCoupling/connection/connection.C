@@ -4,6 +4,10 @@
 #include "fileConnection.H"
 #include "OSspecific.H"
 
+#include <cerrno>
+#include <cstring>
+#include <unistd.h>
+
 std::string Foam::daemonShare::name
 (
     const std::string& stem,
@@ -81,6 +85,20 @@ Foam::connection::connection
 }
 
 
+std::string Foam::connection::nonce()
+{
+    std::string bytes(32, '\0');
+
+    if (::getentropy(&bytes[0], bytes.size()) != 0)
+    {
+        FatalErrorInFunction
+            << "no random numbers: " << std::strerror(errno)
+            << exit(FatalError);
+    }
+    return bytes;
+}
+
+
 Foam::string Foam::connection::startCommand() const
 {
     return
@@ -127,13 +145,13 @@ Foam::message Foam::connection::receive
     // each a sign of life, after which the patience is as long again
     while (m.head.type == message::WAIT && expected == message::WELCOME)
     {
-        Info<< "fiber coupling: " << m.text().c_str() << endl;
+        Info<< "fiber coupling: " << m.line().c_str() << endl;
         read(m, most);
     }
 
     if (m.head.type == message::ERROR)
     {
-        fail("the daemon stopped: " + m.text());
+        fail("the daemon stopped: " + m.line());
     }
     if (m.head.type != expected)
     {

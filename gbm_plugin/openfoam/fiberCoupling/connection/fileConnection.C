@@ -1,10 +1,11 @@
 #include "fileConnection.H"
-#include "OSspecific.H"
 
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fcntl.h>
 #include <fstream>
+#include <sys/stat.h>
 #include <unistd.h>
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
@@ -17,20 +18,22 @@ Foam::fileConnection::fileConnection
 )
 :
     connection(coupling, caseFolder, share),
-    folder_(case_/share.name("exchange")),
+    folder_(-1),
     sent_(0),
     received_(0)
 {
-    peer_ = folder_;
+    peer_ = case_/share.name("exchange");
 
     const auto end = deadline();
-    while ((session_ = session()).empty())
+    string why;
+    while (!openFolder(why) || (session_ = session()).empty())
     {
         if (clock::now() > end)
         {
             fail
             (
-                "no daemon answers: there is no file " + folder_/"session"
+                "no daemon answers: "
+              + (why.empty() ? "there is no file " + peer_ + "/session" : why)
               + "; start it with '" + startCommand() + "'"
             );
         }
@@ -39,24 +42,69 @@ Foam::fileConnection::fileConnection
 }
 
 
+Foam::fileConnection::~fileConnection()
+{
+    if (folder_ >= 0)
+    {
+        ::close(folder_);
+    }
+}
+
+
 // * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
+
+bool Foam::fileConnection::openFolder(string& why)
+{
+    if (folder_ >= 0)
+    {
+        return true;
+    }
+
+    const int fd = ::open
+    (
+        peer_.c_str(), O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC
+    );
+    struct stat found;
+    if (fd < 0 || ::fstat(fd, &found) != 0)
+    {
+        why = peer_ + ": " + std::strerror(errno);
+        return false;
+    }
+    if (found.st_uid != ::geteuid() || (found.st_mode & 077))
+    {
+        why = peer_ + " is not of this user, or others may enter it";
+        ::close(fd);
+        return false;
+    }
+
+    why.clear();
+    folder_ = fd;
+    return true;
+}
+
+
+std::string Foam::fileConnection::path(const std::string& name) const
+{
+    return "/proc/self/fd/" + std::to_string(folder_) + "/" + name;
+}
+
 
 std::string Foam::fileConnection::session() const
 {
-    std::ifstream is(folder_/"session");
+    std::ifstream is(path("session"));
     std::string word;
     is >> word;
     return word;
 }
 
 
-Foam::fileName Foam::fileConnection::path
+std::string Foam::fileConnection::messageName
 (
     const char* from,
     const label n
 ) const
 {
-    return folder_/(session_ + "." + from + "." + std::to_string(n));
+    return session_ + "." + from + "." + std::to_string(n);
 }
 
 
@@ -66,28 +114,43 @@ void Foam::fileConnection::write(const message& m)
     {
         first_ = m;
     }
-    const fileName target(path("flow", sent_++));
-    const fileName part(target + ".part");
+    const std::string target(messageName("flow", sent_++));
+    const std::string part(target + ".part");
+
+    const int fd = ::open
+    (
+        path(part).c_str(),
+        O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
+        0600
+    );
+    bool written = (fd >= 0);
+    const auto put = [&](const char* data, std::size_t size)
     {
-        std::ofstream os(part, std::ios::binary);
-        os.write(reinterpret_cast<const char*>(&m.head), sizeof(m.head));
-        os.write(m.payload.data(), m.payload.size());
-        os.close();
-        if (!os)
+        while (written && size)
         {
-            fail("cannot write " + part + ": " + std::strerror(errno));
+            const ssize_t n = ::write(fd, data, size);
+            written = (n > 0 || errno == EINTR);
+            data += max(n, ssize_t(0));
+            size -= max(n, ssize_t(0));
         }
-    }
-    if (std::rename(part.c_str(), target.c_str()) != 0)
+    };
+    put(reinterpret_cast<const char*>(&m.head), sizeof(m.head));
+    put(m.payload.data(), m.payload.size());
+
+    if (!written || ::close(fd) != 0)
     {
-        fail("cannot rename " + part + ": " + std::strerror(errno));
+        fail("cannot write " + peer_ + "/" + part + ": " + std::strerror(errno));
+    }
+    if (std::rename(path(part).c_str(), path(target).c_str()) != 0)
+    {
+        fail("cannot rename " + peer_ + "/" + part + ": " + std::strerror(errno));
     }
 }
 
 
 void Foam::fileConnection::read(message& m, std::uint64_t most)
 {
-    fileName source(path("fibers", received_++));
+    std::string source(messageName("fibers", received_++));
     const auto end = deadline();
     useconds_t pause = 50;
 
@@ -98,7 +161,7 @@ void Foam::fileConnection::read(message& m, std::uint64_t most)
     {
         // asked before the file is: a daemon's last word precedes its end
         const std::string now = session();
-        is.open(source, std::ios::binary);
+        is.open(path(source), std::ios::binary);
         if (is.is_open())
         {
             break;
@@ -113,7 +176,7 @@ void Foam::fileConnection::read(message& m, std::uint64_t most)
             session_ = now;
             sent_ = 0;
             write(first_);
-            source = path("fibers", 0);
+            source = messageName("fibers", 0);
         }
         if (clock::now() > end)
         {
@@ -130,7 +193,7 @@ void Foam::fileConnection::read(message& m, std::uint64_t most)
     is.read(reinterpret_cast<char*>(&m.head), sizeof(m.head));
     if (!is)
     {
-        fail("short message in " + source);
+        fail("short message in " + peer_ + "/" + source);
     }
     const string problem(m.problem(most));
     if (!problem.empty())
@@ -141,11 +204,25 @@ void Foam::fileConnection::read(message& m, std::uint64_t most)
     is.seekg(0, std::ios::end);
     if (std::uint64_t(is.tellg()) != sizeof(m.head) + m.head.size)
     {
-        fail("message of the wrong length in " + source);
+        fail("message of the wrong length in " + peer_ + "/" + source);
     }
     is.seekg(sizeof(m.head));
     m.payload.resize(m.head.size);
     is.read(m.payload.data(), m.payload.size());
     is.close();
-    std::remove(source.c_str());
+    std::remove(path(source).c_str());
+}
+
+
+// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
+
+void Foam::fileConnection::finish()
+{
+    struct stat found;
+    const std::string next(messageName("fibers", received_));
+
+    if (::lstat(path(next).c_str(), &found) == 0)
+    {
+        fail("GOODBYE is followed by " + peer_ + "/" + next);
+    }
 }

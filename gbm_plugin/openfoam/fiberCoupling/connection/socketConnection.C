@@ -1,6 +1,5 @@
 #include "socketConnection.H"
-#include "IFstream.H"
-#include "OSspecific.H"
+#include "sha256.H"
 
 #include <cerrno>
 #include <cstring>
@@ -9,7 +8,9 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
+#include <sstream>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -68,7 +69,6 @@ int Foam::socketConnection::openUnix(string& why)
     // through the folder's descriptor: a socket's path holds 107 characters,
     // and a case may lie deeper
     const int folder = ::open(case_.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
-    const int s = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
 
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
@@ -78,71 +78,133 @@ int Foam::socketConnection::openUnix(string& why)
         "/proc/self/fd/%d/%s", folder, address_.c_str()
     );
 
-    const int rc =
-        ::connect(s, reinterpret_cast<sockaddr*>(&address), sizeof(address));
-    const int error = errno;
+    const int s =
+        open(reinterpret_cast<sockaddr*>(&address), sizeof(address), why);
     ::close(folder);
 
-    if (rc == 0)
-    {
-        return s;
-    }
-
-    why = std::strerror(error);
-    ::close(s);
-    return -1;
+    return s;
 }
 
 
 int Foam::socketConnection::openTcp(string& why)
 {
-    const fileName file(case_/address_);
-    if (!isFile(file, false))
+    std::string host, port;
+    if (!readAddress(host, port, why))
     {
-        why = "there is no file " + file;
         return -1;
     }
+    const std::string place(host + " port " + port);
 
-    // host port token
-    std::ifstream is(file);
-    std::string host, port, token;
-    is >> host >> port >> token;
-
+    // the daemon writes numbers, and no name has to be looked up
     addrinfo hints{};
     hints.ai_socktype = SOCK_STREAM;
+    hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
     addrinfo* found = nullptr;
     const int rc = ::getaddrinfo(host.c_str(), port.c_str(), &hints, &found);
     if (rc != 0)
     {
-        why = "address " + host + " port " + port + ": " + ::gai_strerror(rc);
+        why = "address " + place + ": " + ::gai_strerror(rc);
         return -1;
     }
 
-    int s = -1;
-    for (addrinfo* a = found; a && s < 0; a = a->ai_next)
-    {
-        s = ::socket(a->ai_family, a->ai_socktype | SOCK_CLOEXEC, 0);
-        if (s >= 0 && ::connect(s, a->ai_addr, a->ai_addrlen) != 0)
-        {
-            why = host + " port " + port + ": " + std::strerror(errno);
-            ::close(s);
-            s = -1;
-        }
-    }
+    const int s = open(found->ai_addr, found->ai_addrlen, why);
     ::freeaddrinfo(found);
 
-    if (s >= 0)
+    if (s < 0)
     {
-        const int on = 1;
-        ::setsockopt(s, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-        token_ = token;
-        peer_ = host + " port " + port;
+        why = place + ": " + why;
+        return -1;
+    }
+    const int on = 1;
+    ::setsockopt(s, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+    peer_ = place;
+    return s;
+}
+
+
+int Foam::socketConnection::open
+(
+    const sockaddr* address,
+    const unsigned size,
+    string& why
+) const
+{
+    // Not blocking: where the daemon's queue is full, the kernel would wait
+    // far beyond the timeout. A later attempt may find another daemon.
+    const int s = ::socket
+    (
+        address->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0
+    );
+    int error = (s < 0 || ::connect(s, address, size) != 0) ? errno : 0;
+
+    if (error == EINPROGRESS)
+    {
+        const auto end = clock::now() + std::chrono::seconds(2);
+        socklen_t length = sizeof(error);
+        if (!ready(s, POLLOUT, min(end, deadline())))
+        {
+            error = ETIMEDOUT;
+        }
+        else if (::getsockopt(s, SOL_SOCKET, SO_ERROR, &error, &length) != 0)
+        {
+            error = errno;
+        }
+    }
+    if (error)
+    {
+        why = std::strerror(error);
+        if (s >= 0)
+        {
+            ::close(s);
+        }
+        return -1;
     }
     return s;
 }
 
 
-void Foam::socketConnection::wait(short events, clock::time_point end)
+bool Foam::socketConnection::readAddress
+(
+    std::string& host,
+    std::string& port,
+    string& why
+)
+{
+    const fileName file(case_/address_);
+    const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+    struct stat found;
+    if (fd < 0 || ::fstat(fd, &found) != 0)
+    {
+        why = file + ": " + std::strerror(errno);
+        return false;
+    }
+
+    char text[512];
+    const ssize_t n = ::read(fd, text, sizeof(text));
+    ::close(fd);
+    if (found.st_uid != ::geteuid() || (found.st_mode & 077))
+    {
+        why = file + " is not of this user, or others may read or write it";
+        return false;
+    }
+
+    std::istringstream is(std::string(text, n > 0 ? n : 0));
+    is >> host >> port >> token_;
+    if (token_.empty())
+    {
+        why = file + " holds no address and token";
+        return false;
+    }
+    return true;
+}
+
+
+bool Foam::socketConnection::ready
+(
+    const int socket,
+    const short events,
+    const clock::time_point end
+)
 {
     while (true)
     {
@@ -151,25 +213,31 @@ void Foam::socketConnection::wait(short events, clock::time_point end)
             end - clock::now()
         ).count();
 
-        pollfd p{socket_, events, 0};
+        pollfd p{socket, events, 0};
         const int n = left > 0 ? ::poll(&p, 1, int(min(left, 1000000L))) : 0;
 
-        if (n > 0)
+        // where poll itself fails, so will what follows, and say why
+        if (n > 0 || (n < 0 && errno != EINTR))
         {
-            return;
+            return true;
         }
         if (n == 0 && clock::now() >= end)
         {
-            fail
-            (
-                "the daemon was silent for " + Foam::name(timeout_)
-              + " s (entry timeout of constant/fiberProperties)"
-            );
+            return false;
         }
-        if (n < 0 && errno != EINTR)
-        {
-            fail(string("poll: ") + std::strerror(errno));
-        }
+    }
+}
+
+
+void Foam::socketConnection::wait(short events, clock::time_point end)
+{
+    if (!ready(socket_, events, end))
+    {
+        fail
+        (
+            "the daemon was silent for " + Foam::name(timeout_)
+          + " s (entry timeout of constant/fiberProperties)"
+        );
     }
 }
 
@@ -191,7 +259,7 @@ void Foam::socketConnection::writeAll(const char* data, std::size_t size)
             read(last, message::maxText);
             if (last.head.type == message::ERROR)
             {
-                fail("the daemon stopped: " + last.text());
+                fail("the daemon stopped: " + last.line());
             }
             fail(string("the daemon is gone: ") + std::strerror(errno));
         }
@@ -252,4 +320,53 @@ void Foam::socketConnection::read(message& m, std::uint64_t most)
     }
     m.payload.resize(m.head.size);
     readAll(m.payload.data(), m.payload.size(), end);
+}
+
+
+// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
+
+void Foam::socketConnection::authenticate(const message& hello)
+{
+    if (token_.empty())
+    {
+        return;     // a Unix socket, which only this user can reach
+    }
+
+    // the daemon's number, and its code of all that was said
+    const std::size_t bytes = 32;
+    const message challenge
+    (
+        receive(message::CHALLENGE, hello.head.step, 2*bytes)
+    );
+    const std::string said
+    (
+        hello.bytes() + challenge.text().substr(0, bytes)
+    );
+    if (challenge.text().substr(bytes) != hmacSha256(token_, "fibers" + said))
+    {
+        fail
+        (
+            "what answers there does not know the token in " + case_/address_
+          + ": it is not the daemon of this case"
+        );
+    }
+
+    message proof(message::PROOF, hello.head.step, hello.head.time);
+    proof.appendText(hmacSha256(token_, "flow" + said));
+    send(proof);
+}
+
+
+void Foam::socketConnection::finish()
+{
+    // a daemon closes at once; one that does not has said enough
+    char byte;
+    if
+    (
+        ready(socket_, POLLIN, clock::now() + std::chrono::seconds(1))
+     && ::recv(socket_, &byte, 1, MSG_DONTWAIT) > 0
+    )
+    {
+        fail("GOODBYE is followed by further bytes");
+    }
 }
