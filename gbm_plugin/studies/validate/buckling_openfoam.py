@@ -29,15 +29,15 @@ from ...statistics.buckling import Tracks, difference, probability, strain
 from ..figures import orders_figure
 from ..scenes import checked_cells, checked_step, ends_apart, observed_orders, order_lines, rms, scene_copy
 from ..study import option
-from ..taylor_green import DEFAULT, Run, Scene
+from ..taylor_green import DEFAULT, RATE, Run, Scene
 from .comparison import sampling_word
 
-WIDTH = np.pi  # W [m]; U₀ = 1 m/s
-VISCOSITY = 0.1
+WIDTH = VELOCITY = np.pi  # W [m] and U₀ [m/s]: W/U₀ is 1 s
+VISCOSITY = 0.1 * np.pi
 # sin x cos y = ½ [sin(x + y) + sin(x − y)], −cos x sin y = −½ [sin(x + y) − sin(x − y)]
 FLOW = """field modes;
-modes ( ((1 1 0) (0 0 0) (-0.5 0.5 0)) ((1 -1 0) (0 0 0) (-0.5 -0.5 0)) );
-"""
+modes ( ((1 1 0) (0 0 0) (-{0} {0} 0)) ((1 -1 0) (0 0 0) (-{0} -{0} 0)) );
+""".format(VELOCITY / 2)
 FORCING = f"""linearForcing {{ type linearForcing; mode constantCoefficient; A {2 * VISCOSITY}; }}
 """
 FIBERS = """recordInterval {every};
@@ -47,7 +47,7 @@ interpolation {interpolation};
 families {{ fibers {{ shape file; positions starts.npy; bendingStiffness {stiffness!r}; }} }}
 """
 PATHS_END = 2.0  # W/U₀, for paths
-REFERENCE = {"time_step": 0.02, "tolerance": 1e-8, "mobility": "rpy"}  # of `simulate`
+REFERENCE = {"time_step": 0.005, "tolerance": 1e-8, "mobility": "rpy"}  # of `simulate`
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,7 +102,7 @@ def run(
     reference = _reference(scene, starts, PATHS_END)
     radius = WIDTH * scene.length / scene.beads / 2
     rows = [
-        {"cells": n, "time_step": WIDTH * PATHS_END / steps}
+        {"cells": n, "time_step": PATHS_END / steps}
         | {"velocity_error": found["velocity_error"]}
         | {"paths_error": ends_apart(found["positions"][-1], reference, radius)}
         for n, found in by_cells.items()
@@ -110,7 +110,7 @@ def run(
     finest = by_cells[middle]["positions"][-1]
     chain = [*by_step.items(), (steps, {"positions": [finest]})]
     temporal = [
-        {"cells": middle, "time_step": WIDTH * PATHS_END / coarse_steps}
+        {"cells": middle, "time_step": PATHS_END / coarse_steps}
         | {"paths_error": ends_apart(coarse["positions"][-1], fine["positions"][-1], radius)}
         for (coarse_steps, coarse), (_, fine) in itertools.pairwise(chain)
     ]
@@ -142,14 +142,14 @@ def _solve(
 ) -> dict:
     """Velocity's distance from the cellular flow at the end, and the recorded positions (S, F, N, 3) [m]."""
     # [N m²]; μ = ν in SI: Sp = μSL⁴/K with S = πU₀/W
-    stiffness = VISCOSITY * (np.pi / WIDTH) * (WIDTH * scene.length) ** 4 / scene.sperm_number
+    stiffness = VISCOSITY * RATE * (WIDTH * scene.length) ** 4 / scene.sperm_number
     words = {"every": every, "interpolation": sampling_word(case), "stiffness": stiffness}
     copy = scene_copy(
         case,
-        folder / f"{cells}_{steps}_{end:g}",
+        folder / f"{cells}_{steps}_{end:g}_{every}",
         cells=cells,
         steps=steps,
-        end_time=WIDTH * end,
+        end_time=end,
         viscosity=VISCOSITY,
         write_every=steps,
         texts={
@@ -161,7 +161,7 @@ def _solve(
     np.save(copy / "starts.npy", starts)
     run_openfoam(copy)
     exact = _exact(cells)
-    found = rms(read_velocity(copy, f"{WIDTH * end:.6g}", (cells, cells, cells)) - exact) / rms(exact)
+    found = rms(read_velocity(copy, f"{end:g}", (cells, cells, cells)) - exact) / rms(exact)
     with open_recording(results(copy)) as recording:
         return {"velocity_error": found, "positions": np.asarray(recording.families["fibers"].positions)}
 
@@ -170,13 +170,13 @@ def _exact(cells: int) -> NDArray:
     """The cellular flow at the cell centres, (3, n, n, n)."""
     centres = 2 * WIDTH * (np.arange(cells) + 0.5) / cells
     positions = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), axis=-1)
-    return np.moveaxis(TaylorGreen(WIDTH, 1.0).sample(positions, 0.0, "velocity")[0], -1, 0)
+    return np.moveaxis(TaylorGreen(WIDTH, VELOCITY).sample(positions, 0.0, "velocity")[0], -1, 0)
 
 
 def _reference(scene: Scene, starts: NDArray, end: float) -> NDArray:
-    stiffness = (np.pi / WIDTH) * (WIDTH * scene.length) ** 4 / scene.sperm_number
+    stiffness = RATE * (WIDTH * scene.length) ** 4 / scene.sperm_number
     fibers = Fibers(starts, stiffness, 1.0)
-    return simulate(fibers, TaylorGreen(WIDTH, 1.0), end_time=WIDTH * end, **REFERENCE).positions[-1]
+    return simulate(fibers, TaylorGreen(WIDTH, VELOCITY), end_time=end, **REFERENCE).positions[-1]
 
 
 def _probabilities(scene: Scene, counted: dict, end: float) -> list[dict]:
