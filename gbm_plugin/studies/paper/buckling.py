@@ -20,6 +20,7 @@ from ...report.style import COLOURS, new_figure
 from ...statistics.buckling import REGIONS, probability
 from ..study import option
 from ..taylor_green import NORMALISATIONS, Run, Scene, run_scenes
+from .buckling_thresholds import link_matrices, threshold
 
 CURVE = (
     *(
@@ -99,7 +100,9 @@ def run(
     found = [row_of(run, region) for run in runs]
     if state is None:
         shutil.rmtree(folder, ignore_errors=True)
-    return {"end": end, "region": region} | options | {"length_over_width": scenes[0].length, "rows": found}
+    first = threshold(link_matrices(beads, mobility, "cellular"), 1)
+    settings = {"end": end, "region": region} | options | {"length_over_width": scenes[0].length}
+    return settings | {"first_threshold": first, "rows": found}
 
 
 def row_of(run: Run, region: str = "strain", normalisation: str = NORMALISATIONS[0]) -> dict:
@@ -151,6 +154,9 @@ def table(result: dict) -> str:
             f"{r['probability']:9.5f} {r['standard_error']:9.2g} {r['binomial_error']:9.2g}  "
             f"{r['trapped_fraction']:8.3f} {r['seconds']:9.1f}"
         )
+    lines.append(
+        f"a straight chain in the strongest compression begins to buckle at {result['first_threshold']:.1f}"
+    )
     lines.append(f"processor time {sum(r['seconds'] for r in result['rows']):.0f} s")
     return "\n".join(lines)
 
@@ -162,5 +168,8 @@ def draw(result: dict) -> Figure:
     found = sorted(result["rows"], key=lambda row: row["sperm_number"])
     x, y, error = (np.array([r[n] for r in found]) for n in ("sperm_number", "probability", "standard_error"))
     axes.errorbar(x, y, error, color=COLOURS[0], marker="o", markersize=4, capsize=2, linewidth=1.2)
+    label = "a straight chain begins to buckle"
+    axes.axvline(result["first_threshold"], color="0.5", linestyle="--", linewidth=1, label=label)
+    axes.legend()
     axes.set(xscale="log", xlabel="Sp = μSL⁴/K$^b$", ylabel="buckling probability", ylim=(-0.02, None))
     return figure
