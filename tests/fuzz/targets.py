@@ -13,9 +13,10 @@ import h5py
 import numpy as np
 
 from gbm_plugin.case.layout import STATE_FILE
+from gbm_plugin.case.mesh import box_mesh
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.fleet.fleet import Fleet
-from gbm_plugin.output.field import box_mesh, read_velocity
+from gbm_plugin.output.field import read_velocity
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
 from gbm_plugin.output.tables import read_dat
 from gbm_plugin.report.paraview import polylines
