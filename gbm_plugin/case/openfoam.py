@@ -49,7 +49,8 @@ def environment() -> dict[str, str]:
         raise InstallationError(f"the plugin {PLUGIN} is not in {library}: build it with ./Allwmake")
     env["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, [str(library), env.get("LD_LIBRARY_PATH", "")]))
     env["PATH"] = os.pathsep.join(filter(None, [str(programs), env.get("PATH", "")]))
-    env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    if os.geteuid() == 0:
+        env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return env
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
@@ -139,7 +140,7 @@ def read_scene(case: Path | str) -> Scene:
     fibers = Dictionary.read(case, "constant/fiberProperties")
     scene = Scene(
         case=case,
-        application=control.word("application", default="pimpleFoam"),
+        application=_read_application(control),
         kinematic_viscosity=_read_viscosity(case),
         density=fibers.number("rho", 1.0, above=0),
         time_step=time_step,
@@ -163,6 +164,16 @@ def read_scene(case: Path | str) -> Scene:
                 f"fibers of family {family.name}: each needs at least one"
             )
     return scene
+
+
+def _read_application(control: Dictionary) -> str:
+    """The solver: a program of the PATH, and neither a file that the case brings nor options."""
+    name = control.word("application", default="pimpleFoam")
+    if not re.fullmatch(r"[A-Za-z]\w*", name, flags=re.ASCII):
+        raise control.fail(
+            "application", f"is '{name}': the name of a program on the PATH is needed, as pimpleFoam"
+        )
+    return name
 
 
 def _write_interval(control: Dictionary, time_step: float) -> float:
