@@ -12,8 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 NEEDS = ("velocity", "rotation", "gradient")  # each costs more than the one before
 
 
+class FlowEnded(ValueError):
+    """The flow is not known at a time; until: the last at which it is."""
+
+    def __init__(self, message: str, until: float | None = None):
+        super().__init__(message)
+        self.until = until
+
+
 class Flow(Protocol):
-    """Anything that carries fibers."""
+    """Anything that carries fibers.
+
+    A flow that is known at times of its own only, and cannot go back, has `sample_interval`, the time between them;
+    one that is known in a part of space only has `inside(positions) -> (...,)`.
+    """
 
     def sample(self, positions: NDArray, time: float, need: str) -> tuple[NDArray, NDArray | None]:
         """Velocity (..., 3) at positions (..., 3), and beside it what need asks for: "velocity" (None), "rotation"

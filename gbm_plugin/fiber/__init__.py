@@ -5,14 +5,30 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .fibers import Fibers
+    from .group import Group
     from .preparation import prepare
     from .rates import instant_rates
     from .stepper import Stepper, merged_states
     from .trajectory import Trajectory, simulate
 
-__all__ = ["Fibers", "Stepper", "Trajectory", "instant_rates", "merged_states", "prepare", "simulate"]
+__all__ = [
+    "Fibers",
+    "Group",
+    "Stepper",
+    "Trajectory",
+    "instant_rates",
+    "merged_states",
+    "prepare",
+    "simulate",
+]
 
-_HOMES = {"Fibers": "fibers", "Stepper": "stepper", "merged_states": "stepper", "instant_rates": "rates"}
+_HOMES = {
+    "Fibers": "fibers",
+    "Group": "group",
+    "Stepper": "stepper",
+    "merged_states": "stepper",
+    "instant_rates": "rates",
+}
 _HOMES |= {"Trajectory": "trajectory", "simulate": "trajectory", "prepare": "preparation"}
 
 

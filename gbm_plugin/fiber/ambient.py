@@ -50,6 +50,11 @@ class Ambient:
         self.times.append(float(time))
         self.samples.append((pack(velocity, buffers[0]), pack(rotation, buffers[1])))
 
+    def forget(self, after: float) -> None:
+        """Drop the samples of later times."""
+        count = sum(time <= after for time in self.times)
+        del self.times[count:], self.samples[count:]
+
     def polynomial(self, start: float) -> tuple[np.ndarray, list[tuple[np.ndarray, ...]]]:
         """Times counted from start, and fields, of the newest samples, newest first.
 

@@ -57,12 +57,11 @@ class Stepper:
         self.provisional = False
         self._ambient = Ambient(fibers.count, fibers.beads)
         self._material = material(fibers)
-        blocks, rows = -(-fibers.count // LANES), 3 * fibers.beads
         # before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
-        self._last = np.zeros((blocks, rows, LANES))
         self._state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
-        self._last_multipliers = np.zeros((blocks, rows - 3, LANES))
-        self._multipliers = np.zeros((blocks, rows - 3, LANES))
+        self._last = np.zeros_like(self._state)
+        self._multipliers = np.zeros_like(self._state[:, 3:])
+        self._last_multipliers = np.zeros_like(self._multipliers)
         self._last_rates = [np.zeros_like(self._state) for _ in range(2)]
         self._rates = list(self._last_rates)
         self._spare = [np.zeros_like(self._state) for _ in range(2)]
@@ -98,6 +97,32 @@ class Stepper:
     def prediction_gap(self) -> np.ndarray:
         """(F,) rms over beads of |predicted − received ambient velocity| at the newest sample."""
         return self._ambient.prediction_gap
+
+    @property
+    def samples(self) -> int:
+        """Samples at hand, four at most; the newest is of sampled_until."""
+        return len(self._ambient)
+
+    @property
+    def sampled_until(self) -> float:
+        """Time of the newest sample."""
+        return self._ambient.times[-1]
+
+    @property
+    def flow_error(self) -> np.ndarray:
+        """(F,) bead displacement, over fiber length, that extrapolating the flow over the last step cost: known once
+        the sample at its end is there.
+
+        The predicted velocity errs by c Π(t − t_i), t_i the times of the samples in the polynomial, and the prediction
+        gap is its error at the end: c, and with it the integral over the step, follow. A step that was corrected is
+        better than that.
+        """
+        before = np.array(self._ambient.times[-1 - SAMPLES : -1])
+        if not len(before):
+            return np.zeros(self.fibers.count)
+        error = np.poly((before - self._start) / self._length)  # in units of the step, from its start
+        share = np.polyval(np.polyint(error), 1.0) / np.polyval(error, 1.0)
+        return abs(share) * self._length * self.prediction_gap / self.fibers.contour_length
 
     def observe(self, time, velocity, extra) -> None:
         """Take the flow at the current positions: velocity (F, N, 3); rotation (F, N, 3) or gradient.
@@ -151,10 +176,22 @@ class Stepper:
 
     def correct(self) -> None:
         """Redo the last step with the sample at its end included."""
-        if not self.provisional or self._ambient.times[-1] != self.time:
-            raise ValueError("correct() follows a provisional advance() and the observe() at its end")
+        if not self._length or self._ambient.times[-1] != self.time:
+            raise ValueError("correct() follows advance() and the observe() at its end")
         self.provisional = False
         self._run()
+
+    def undo(self) -> None:
+        """Take the last step back, with the sample at its end; the next may be shorter. Not twice."""
+        if self.time != self._start + self._length or not self._length:
+            raise ValueError("undo() follows advance(), once")
+        self._ambient.forget(after=self._start)
+        self.time, self._length, self.provisional = self._start, 0.0, False
+        self._state, self._last = self._last, self._state
+        self._multipliers, self._last_multipliers = self._last_multipliers, self._multipliers
+        self._rates, self._ages = self._last_rates, self._last_ages
+        self._step, self._tension = self._last_step, self._last_tension
+        self._counts["steps"] -= 1
 
     def _run(self) -> None:
         """The last step, from its kept start, with the samples that there are."""

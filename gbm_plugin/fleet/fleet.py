@@ -15,10 +15,9 @@ from ..case.layout import STATE_FILE, fiber_state
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
 from ..errors import CaseError, PredictionError, StateError
-from ..fiber import Fibers, Stepper, merged_states, prepare
+from ..fiber import Fibers, Group, Stepper, merged_states, prepare
 from ..fiber.state import check_state, forms
 from ..files import replaced
-from ..sampling import NEEDS, rotation_of
 from ..statistics.fibers import end_to_end_squared_ratio
 
 log = logging.getLogger(__name__)
@@ -41,21 +40,13 @@ def prepare_kernels(families: Sequence[Family]) -> None:
         prepare(**dict(options))
 
 
-class Fleet:
-    """The fibers of a scene on their way through time.
-
-    Positions are (B, 3), B the beads of all families one after the other. The calls follow those of
-    `fiber.Stepper`.
-    """
+class Fleet(Group):
+    """The fibers of a scene on their way through time, one family after the other."""
 
     def __init__(self, families: Sequence[Family], steppers: Sequence[Stepper], share: Share = WHOLE):
+        super().__init__(steppers)
         self.families = tuple(families)
         self.share = share
-        self.steppers = tuple(steppers)
-        ends = np.cumsum([f.count * f.beads for f in families])
-        self._slices = [slice(e - f.count * f.beads, e) for e, f in zip(ends, families, strict=True)]
-        self.beads = int(ends[-1])
-        self._positions: np.ndarray | None = None
 
     @classmethod
     def seeded(cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE) -> Fleet:
@@ -81,56 +72,9 @@ class Fleet:
         return cls(scene.families, steppers, share)
 
     @property
-    def time(self) -> float:
-        return self.steppers[0].time
-
-    @property
-    def need(self) -> str:
-        """What must be sampled for all families: "velocity", "rotation" or "gradient"."""
-        return max((s.need for s in self.steppers), key=NEEDS.index)
-
-    @property
     def sizes(self) -> list[tuple[int, int, int]]:
         """Fibers, beads of each, and number of the first fiber, of each family."""
         return [(f.count, f.beads, f.first) for f in self.families]
-
-    @property
-    def positions(self) -> np.ndarray:
-        """(B, 3), to be read only."""
-        if self._positions is None:
-            self._positions = np.concatenate([s.positions.reshape(-1, 3) for s in self.steppers])
-            self._positions.flags.writeable = False
-        return self._positions
-
-    @property
-    def by_family(self) -> list[np.ndarray]:
-        """Positions (count, beads, 3) of each family."""
-        parts = zip(self.families, self._slices, strict=True)
-        return [self.positions[part].reshape(f.count, f.beads, 3) for f, part in parts]
-
-    def observe(self, time: float, velocity: np.ndarray, extra: np.ndarray | None) -> None:
-        for family, stepper, part in zip(self.families, self.steppers, self._slices, strict=True):
-            shape = (family.count, family.beads)
-            stepper.observe(
-                time,
-                velocity[part].reshape(*shape, 3),
-                _ambient(stepper.need, extra, part, shape),
-            )
-
-    def advance(self, time_step: float) -> None:
-        self._positions = None
-        for s in self.steppers:
-            s.advance(time_step)
-
-    @property
-    def provisional(self) -> bool:
-        return any(s.provisional for s in self.steppers)
-
-    def correct(self) -> None:
-        self._positions = None
-        for s in self.steppers:
-            if s.provisional:
-                s.correct()
 
     @property
     def prediction_gap(self) -> float:
@@ -235,13 +179,3 @@ class Fleet:
 def _of_family(state: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
     prefix = f"{name}/"
     return {key.removeprefix(prefix): value for key, value in state.items() if key.startswith(prefix)}
-
-
-def _ambient(need: str, extra: np.ndarray | None, part: slice, shape: tuple[int, int]) -> np.ndarray | None:
-    """What one family needs, of what was sampled for all."""
-    if need == "velocity" or extra is None:
-        return None
-    extra = extra[part]
-    if need == "rotation" and extra.ndim == 3:
-        extra = rotation_of(extra)
-    return extra.reshape(*shape, *extra.shape[1:])

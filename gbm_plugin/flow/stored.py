@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..sampling import NEEDS, lagrange_weights, one_of, rotation_of
+from ..sampling import NEEDS, FlowEnded, lagrange_weights, one_of, rotation_of
 from . import grid
 
 POINTS_IN_TIME = {"linear": 2, "cubic": 4}
@@ -111,8 +111,9 @@ class StoredFlow:
         slack = SAME_TIME * np.diff(times[max(0, near - 1) : near + 2]).min()
         at_field = abs(times[near] - time) <= slack
         if not at_field and not times[0] <= time <= times[-1]:
-            raise ValueError(
-                f"time {time:.9g} is not within the stored fields, from {times[0]:.9g} to {times[-1]:.9g}"
+            raise FlowEnded(
+                f"time {time:.9g} is not within the stored fields, from {times[0]:.9g} to {times[-1]:.9g}",
+                until=float(times[-1]),
             )
         count = min(POINTS_IN_TIME[self.in_time], len(times))
         before = near if at_field else int(np.searchsorted(times, time)) - 1

@@ -71,6 +71,11 @@ class SpectralSolver:
     box = property(lambda self: self.modes.box, doc="Edge length.")
     viscosity = property(lambda self: self.operators.viscosity, doc="Kinematic viscosity.")
 
+    @property
+    def sample_interval(self) -> float | None:
+        """Between the times at which `sample` knows the flow; None where `cfl` chooses them."""
+        return self.time_step
+
     def set_velocity(self, u: ArrayLike) -> None:
         """Set the velocity from node values (3, n, n, n): its mean and its solenoidal, resolved part."""
         u = np.asarray(u)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gbm_plugin import Fibers, simulate
-from gbm_plugin.flow import LinearFlow
+from gbm_plugin.flow import ABC, LinearFlow
 
 from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step, straight_chain
 
@@ -111,19 +111,67 @@ def test_a_fiber_does_not_depend_on_its_batch():
         assert np.abs(alone.positions[0] - together[one]).max() < 1e-12
 
 
+class Counted:
+    """A flow, and how often it was sampled."""
+
+    def __init__(self, flow):
+        self.flow, self.times = flow, []
+
+    def sample(self, positions, time, need):
+        self.times.append(time)
+        return self.flow.sample(positions, time, need)
+
+
 def test_families_ride_in_one_flow():
+    """Sampled once for all; with ab3, whose steps do not depend on each other, as each would alone."""
     families = [Fibers(bent(2, beads, 0.1), 1e-3, 1.0) for beads in (5, 9)]
-    both = simulate(families, WavyFlow(), 0.1, 0.5)
+    flow = Counted(WavyFlow())
+    both = simulate(families, flow, 0.1, 0.5, "ab3", record_every=2)
+    assert flow.times == pytest.approx([0, 0.1, 0.1, 0.2, 0.2, 0.3, 0.4, 0.5])  # the first two steps twice
     for family, trajectory in zip(families, both, strict=True):
-        alone = simulate(family, WavyFlow(), 0.1, 0.5)
+        alone = simulate(family, WavyFlow(), 0.1, 0.5, "ab3", record_every=2)
         assert (alone.positions == trajectory.positions).all()
-        assert trajectory.times[-1] == 0.5
-        assert trajectory.positions.shape == (1, 2, family.beads, 3)
+        assert trajectory.times == pytest.approx([0, 0.2, 0.4, 0.5])
+        assert trajectory.positions.shape == (4, 2, family.beads, 3)
+        assert trajectory.positions[0] == pytest.approx(family.positions, abs=1e-15)
+    for family, trajectory in zip(families, simulate(families, WavyFlow(), 0.1, 0.5), strict=True):
+        alone = simulate(family, WavyFlow(), 0.1, 0.5)
+        assert np.abs(alone.positions - trajectory.positions).max() < 1e-3 * family.contour_length
+
+
+def test_a_run_may_start_at_any_time():
+    """Halves that follow each other make the whole, within the tolerance."""
+    fibers = Fibers(bent(2, 6, 0.1), 1e-3, 1.0)
+    whole = simulate(fibers, WavyFlow(), 0.1, 2.0, tolerance=1e-6)
+    half = simulate(fibers, WavyFlow(), 0.1, 1.0, tolerance=1e-6)
+    rest = Fibers(half.positions[-1], 1e-3, 1.0)
+    rest = simulate(rest, WavyFlow(), 0.1, 2.0, tolerance=1e-6, start_time=1.0)
+    assert rest.times[0] == 1.0 and rest.times[-1] == 2.0
+    assert np.abs(rest.positions[-1] - whole.positions[-1]).max() < 1e-5 * fibers.contour_length
+
+
+@pytest.fixture(scope="module")
+def fast():
+    """Fibers that a flow carries over three times the box until t = 2, the flow, and where they are then."""
+    fibers = Fibers.straight(20, 16, 1.5, 1e-2, 0.02, box=6.28, seed=3)
+    return fibers, ABC(5, 4, 3), simulate(fibers, ABC(5, 4, 3), 0.05, 2.0, tolerance=1e-7).positions[-1]
+
+
+@pytest.mark.parametrize(("step", "tolerance"), [(0.5, 1e-5), (2.0, 1e-6), (2.0, 1e-3)])
+def test_long_steps_keep_the_tolerance(fast, step, tolerance):
+    """Steps in which the extrapolation of the flow fails are redone."""
+    fibers, flow, exact = fast
+    run = simulate(fibers, flow, step, 2.0, tolerance=tolerance)
+    error = np.sqrt(((run.positions[-1] - exact) ** 2).sum(axis=2).mean(axis=1)) / fibers.contour_length
+    # chaos: what a step adds grows by e^(λt), λ about 1 there
+    assert error.max() < 100 * tolerance
+    assert run.report["redone"] > 0
+    assert run.report["worst_flow_error"] <= 0.1 * tolerance
 
 
 def test_length_is_exact_after_many_steps():
     fibers = Fibers(bent(8, 6, 0.1), 1e-4, 1.0)
-    stepper = run_once_per_step(fibers, WavyFlow(), 0.01, 100_000, integrator="ab3")
+    stepper = run_once_per_step(fibers, WavyFlow(), 0.05, 10_000, integrator="ab3")
     links = np.diff(stepper.positions - stepper.positions.mean(axis=1, keepdims=True), axis=1)
     state = stepper.state()["links_and_centres"].reshape(-1, 6, 3)[:, :5]
     assert np.abs(np.sqrt((state**2).sum(axis=2)) - 1).max() < 1e-13
