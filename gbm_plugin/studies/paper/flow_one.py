@@ -142,10 +142,10 @@ def run(
         record.save()
         for number, handler in handlers.items():
             signal.signal(number, handler)
-    return {"flow": flow, "cells": solver.cells, "rows": _means(record.series, settle)}
+    return {"flow": flow, "cells": solver.cells, "rows": means(record.series, settle)}
 
 
-def _means(series: TimeSeries, settle: float) -> list[dict]:
+def means(series: TimeSeries, settle: float) -> list[dict]:
     """Mean and standard error of every column from `settle` on."""
     names = [n for n in series.columns if n != "time"]
     means = {n: series.mean(n, settle) for n in names}
