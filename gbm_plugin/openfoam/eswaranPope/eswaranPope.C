@@ -1,7 +1,9 @@
 #include "eswaranPope.H"
 #include "periodicBox.H"
+#include "vectorised.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvMatrices.H"
+#include "mathematicalConstants.H"
 
 namespace Foam
 {
@@ -15,8 +17,15 @@ namespace fv
 namespace
 {
 
-//- Sum of a b, in partial sums that vectorise
-double sumProducts(const Foam::label n, const double* a, const double* b)
+//- rate += f; the sum of u f, in partial sums that vectorise
+VECTORISED
+double addForce
+(
+    const Foam::label n,
+    const double* __restrict__ f,
+    const double* __restrict__ u,
+    double* __restrict__ rate
+)
 {
     constexpr Foam::label lanes = 8;
     double sums[lanes] = {};
@@ -26,13 +35,15 @@ double sumProducts(const Foam::label n, const double* a, const double* b)
     {
         for (Foam::label j = 0; j < lanes; ++j)
         {
-            sums[j] += a[i + j]*b[i + j];
+            sums[j] += u[i + j]*f[i + j];
+            rate[i + j] += f[i + j];
         }
     }
     double sum = 0;
     for (; i < n; ++i)
     {
-        sum += a[i]*b[i];
+        sum += u[i]*f[i];
+        rate[i] += f[i];
     }
     for (const double s : sums)
     {
@@ -55,11 +66,13 @@ Foam::fv::eswaranPope::eswaranPope
 )
 :
     turbulenceForcing(name, modelType, dict, mesh),
+    reached_(mesh.time().timeIndex()),
     work_(0)
 {
     read(dict);
-    waves_.reset(new waveSum(mesh, process_->k()));
+    modes_.reset(new waveSum(process_->k()));
     start();
+    force_ = process_->force();
 }
 
 
@@ -112,6 +125,29 @@ void Foam::fv::eswaranPope::checkMesh(const scalar cutoff) const
 }
 
 
+void Foam::fv::eswaranPope::reach()
+{
+    const Time& time = mesh_.time();
+
+    if (reached_ != time.timeIndex())
+    {
+        reached_ = time.timeIndex();
+        process_->advance(time.deltaTValue());
+        force_ = process_->force();
+    }
+}
+
+
+void Foam::fv::eswaranPope::forAllRows(const cellRows::use& f) const
+{
+    if (!cells_.valid())
+    {
+        cells_.reset(new cellRows(mesh_, modes_()));
+    }
+    cells_->forAllRows(modes_(), force_, f);
+}
+
+
 // * * * * * * * * * * * * Protected Member Functions  * * * * * * * * * * * //
 
 Foam::scalar Foam::fv::eswaranPope::power
@@ -125,9 +161,8 @@ Foam::scalar Foam::fv::eswaranPope::power
     scalar sum = 0;
     scalar volume = 0;
 
-    waves_->sum
+    forAllRows
     (
-        process_->force(),
         [&](const label first, const scalarField (&f)[vector::nComponents])
         {
             forAll(f[0], i)
@@ -153,23 +188,16 @@ Foam::scalar Foam::fv::eswaranPope::power(const flowStatistics&) const
 }
 
 
-void Foam::fv::eswaranPope::follow(const flowStatistics&)
+void Foam::fv::eswaranPope::choose(const flowStatistics&)
 {
-    work_ = 0;
+    reach();
 }
 
 
-void Foam::fv::eswaranPope::choose(const flowStatistics&)
+void Foam::fv::eswaranPope::follow(const flowStatistics&)
 {
-    if (isExplicit())
-    {
-        force_ = process_->force();
-    }
-    process_->advance(mesh_.time().deltaTValue());
-    if (!isExplicit())
-    {
-        force_ = process_->force();
-    }
+    reach();
+    work_ = 0;
 }
 
 
@@ -178,9 +206,8 @@ void Foam::fv::eswaranPope::add(fvMatrix<vector>& eqn) const
     const scalarField& V = mesh_.V();
     vectorField& source = eqn.source();
 
-    waves_->sum
+    forAllRows
     (
-        force_,
         [&](const label first, const scalarField (&f)[vector::nComponents])
         {
             forAll(f[0], i)
@@ -235,27 +262,44 @@ bool Foam::fv::eswaranPope::read(const dictionary& dict)
 }
 
 
+void Foam::fv::eswaranPope::correct(volVectorField& U)
+{
+    reach();
+    turbulenceForcing::correct(U);
+}
+
+
 void Foam::fv::eswaranPope::addRate(const latticeLayer& layer)
 {
-    waves_->sum
-    (
-        force_,
-        layer,
-        [&](const label y, const scalarField (&f)[vector::nComponents])
-        {
-            for (direction d = 0; d < vector::nComponents; ++d)
-            {
-                const double* __restrict__ u =
-                    layer.velocity[d] + y*layer.stride;
-                double* __restrict__ rate = layer.rate[d] + y*layer.n.x();
-                const scalar* __restrict__ force = f[d].cdata();
+    const auto centre = [&](const label i, const direction d)
+    {
+        return constant::mathematical::twoPi*(i + 0.5)/layer.n[d];
+    };
+    const label n = layer.n.x();
 
-                for (label x = 0; x < layer.n.x(); ++x)
-                {
-                    rate[x] += force[x];
-                }
-                work_ += sumProducts(layer.n.x(), u, force);
-            }
+    if (waves_.empty())
+    {
+        scalarField x(n);
+        forAll(x, i)
+        {
+            x[i] = centre(i, vector::X);
         }
-    );
+        waves_ = modes_->along(x);
+    }
+
+    modes_->toPlane(force_, centre(layer.k, vector::Z));
+    for (label y = 0; y < layer.n.y(); ++y)
+    {
+        modes_->toRow(centre(y, vector::Y));
+        modes_->values(waves_, values_);
+
+        for (direction d = 0; d < vector::nComponents; ++d)
+        {
+            work_ += addForce
+            (
+                n, values_[d].cdata(),
+                layer.velocity[d] + y*layer.stride, layer.rate[d] + y*n
+            );
+        }
+    }
 }

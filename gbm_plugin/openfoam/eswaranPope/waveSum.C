@@ -1,27 +1,57 @@
 #include "waveSum.H"
+#include "vectorised.H"
 #include "DynamicList.H"
-#include "mathematicalConstants.H"
 
 namespace
 {
 
 using namespace Foam;
 
-//- Cell centres that differ by less, in units of edge/2 pi, are in one row
-constexpr scalar same = 1e-11;
+//- Waves that are summed in one pass
+constexpr label few = 4;
 
 
-//- exp(i k x) for -reach <= k <= reach
-List<complex> waves(const label reach, const scalar x)
+//- f += sum c[2 k] wave[2 k] - c[2 k + 1] wave[2 k + 1]
+template<label N>
+INLINE void addFew
+(
+    const label n,
+    const double* __restrict__ c,
+    const double* const* __restrict__ wave,
+    double* __restrict__ f
+)
 {
-    List<complex> w(2*reach + 1);
-
-    forAll(w, i)
+    for (label i = 0; i < n; ++i)
     {
-        const scalar angle = (i - reach)*x;
-        w[i] = complex(std::cos(angle), std::sin(angle));
+        double sum = 0;
+
+        #pragma GCC unroll 4
+        for (label k = 0; k < N; ++k)
+        {
+            sum += c[2*k]*wave[2*k][i] - c[2*k + 1]*wave[2*k + 1][i];
+        }
+        f[i] += sum;
     }
-    return w;
+}
+
+
+VECTORISED
+void addWaves
+(
+    const label n,
+    const label waves,
+    const double* c,
+    const double* const* wave,
+    double* f
+)
+{
+    switch (waves)
+    {
+        case 1: addFew<1>(n, c, wave, f); break;
+        case 2: addFew<2>(n, c, wave, f); break;
+        case 3: addFew<3>(n, c, wave, f); break;
+        default: addFew<few>(n, c, wave, f);
+    }
 }
 
 }
@@ -29,27 +59,12 @@ List<complex> waves(const label reach, const scalar x)
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
-Foam::waveSum::waveSum(const fvMesh& mesh, const UList<labelVector>& k)
+Foam::waveSum::waveSum(const UList<labelVector>& k)
 :
-    reach_(0)
-{
-    const boundBox& box = mesh.bounds();
-
-    findColumns(k);
-    findRows
-    (
-        (mesh.cellCentres() - box.min())
-       *(constant::mathematical::twoPi/box.span().x())
-    );
-}
-
-
-// * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
-
-void Foam::waveSum::findColumns(const UList<labelVector>& k)
+    reach_(0),
+    modes_(k.size())
 {
     DynamicList<column> columns;
-    modes_.setSize(k.size());
 
     forAll(k, i)
     {
@@ -68,82 +83,55 @@ void Foam::waveSum::findColumns(const UList<labelVector>& k)
         }
         if (c == columns.size())
         {
-            columns.append(column{q.x(), q.y()});
+            columns.append(column{q.x(), q.y(), {Zero, Zero}});
         }
         modes_[i] = {conjugate, c, q.z()};
     }
     columns_.transfer(columns);
+    lines_.setSize(reach_ + 1);
+    powers_.setSize(2*reach_ + 1);
 }
 
 
-void Foam::waveSum::findRows(const vectorField& x)
+// * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
+
+void Foam::waveSum::setPowers(const scalar x)
 {
-    DynamicList<row> rows;
+    const complex first(std::cos(x), std::sin(x));
+    complex* const w = powers_.begin() + reach_;
 
-    forAll(x, celli)
+    w[0] = complex(1, 0);
+    for (label k = 1; k <= reach_; ++k)
     {
-        if
-        (
-            rows.empty()
-         || mag(x[celli].y() - rows.last().y) > same
-         || mag(x[celli].z() - rows.last().z) > same
-        )
-        {
-            rows.append(row{celli, 0, x[celli].y(), x[celli].z(), -1});
-        }
-        ++rows.last().size;
+        w[k] = w[k - 1]*first;
+        w[-k] = w[k].conjugate();
     }
-    rows_.transfer(rows);
-
-    DynamicList<List<scalarField>> tables;
-    label last = -1;    // the row that the last table is made for
-
-    forAll(rows_, r)
-    {
-        const label n = rows_[r].size;
-        const SubField<vector> here(x, n, rows_[r].first);
-        bool known = (last >= 0 && rows_[last].size == n);
-
-        for (label i = 0; known && i < n; ++i)
-        {
-            known = mag(here[i].x() - x[rows_[last].first + i].x()) < same;
-        }
-
-        if (!known)
-        {
-            last = r;
-            tables.append(table(scalarField(here.component(vector::X))));
-        }
-        rows_[r].table = tables.size() - 1;
-    }
-    tables_.transfer(tables);
 }
 
 
-Foam::List<Foam::scalarField> Foam::waveSum::table(const scalarField& x) const
+// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
+
+Foam::waveSum::waves Foam::waveSum::along(const scalarField& x) const
 {
-    List<scalarField> values(2*reach_);
+    waves table(2*reach_);
 
     for (label k = 1; k <= reach_; ++k)
     {
-        const scalarField angle(k*x);
-        values[2*k - 2] = cos(angle);
-        values[2*k - 1] = sin(angle);
+        table[2*k - 2] = cos(k*x);
+        table[2*k - 1] = sin(k*x);
     }
-    return values;
+    return table;
 }
 
 
-void Foam::waveSum::sumColumns
-(
-    const UList<amplitude>& amplitudes,
-    const scalar z,
-    List<amplitude>& columns
-) const
+void Foam::waveSum::toPlane(const UList<amplitude>& amplitudes, const scalar z)
 {
-    const List<complex> w(waves(reach_, z));
+    setPowers(z);
 
-    columns = amplitude{Zero, Zero};
+    for (column& c : columns_)
+    {
+        c.sum = {Zero, Zero};
+    }
     forAll(modes_, i)
     {
         amplitude a(amplitudes[i]);
@@ -151,112 +139,48 @@ void Foam::waveSum::sumColumns
         {
             a.im = -a.im;
         }
-        columns[modes_[i].column].add(w[modes_[i].kz + reach_], a);
+        columns_[modes_[i].column].sum.add(powers_[modes_[i].kz + reach_], a);
     }
 }
 
 
-void Foam::waveSum::sumLines
-(
-    const UList<amplitude>& columns,
-    const scalar y,
-    List<amplitude>& lines
-) const
+void Foam::waveSum::toRow(const scalar y)
 {
-    const List<complex> w(waves(reach_, y));
+    setPowers(y);
 
-    lines = amplitude{Zero, Zero};
-    forAll(columns_, c)
+    lines_ = amplitude{Zero, Zero};
+    for (const column& c : columns_)
     {
-        lines[columns_[c].kx].add(w[columns_[c].ky + reach_], columns[c]);
+        lines_[c.kx].add(powers_[c.ky + reach_], c.sum);
     }
 }
 
 
-void Foam::waveSum::sumRow
+void Foam::waveSum::values
 (
-    const UList<amplitude>& lines,
-    const List<scalarField>& table,
-    const label size,
-    scalarField (&values)[vector::nComponents]
+    const waves& table,
+    scalarField (&f)[vector::nComponents]
 ) const
 {
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        values[d].setSize(size);
-        values[d] = 2*lines[0].re[d];
-        scalar* __restrict__ v = values[d].begin();
+        f[d].setSize(table[0].size());
+        f[d] = 2*lines_[0].re[d];
 
-        for (label k = 1; k <= reach_; ++k)
+        for (label first = 1; first <= reach_; first += few)
         {
-            const scalar* __restrict__ cosine = table[2*k - 2].cdata();
-            const scalar* __restrict__ sine = table[2*k - 1].cdata();
-            const scalar re = 2*lines[k].re[d];
-            const scalar im = 2*lines[k].im[d];
+            const label waves = min(few, reach_ + 1 - first);
+            const double* wave[2*few];
+            double c[2*few];
 
-            for (label i = 0; i < size; ++i)
+            for (label k = 0; k < waves; ++k)
             {
-                v[i] += re*cosine[i] - im*sine[i];
+                c[2*k] = 2*lines_[first + k].re[d];
+                c[2*k + 1] = 2*lines_[first + k].im[d];
+                wave[2*k] = table[2*(first + k) - 2].cdata();
+                wave[2*k + 1] = table[2*(first + k) - 1].cdata();
             }
+            addWaves(f[d].size(), waves, c, wave, f[d].begin());
         }
-    }
-}
-
-
-// * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
-
-void Foam::waveSum::sum(const UList<amplitude>& amplitudes, const use& f) const
-{
-    List<amplitude> columns(columns_.size());
-    List<amplitude> lines(reach_ + 1);
-    scalarField values[vector::nComponents];
-    scalar z = GREAT;
-
-    for (const row& r : rows_)
-    {
-        if (mag(r.z - z) > same)
-        {
-            z = r.z;
-            sumColumns(amplitudes, z, columns);
-        }
-        sumLines(columns, r.y, lines);
-        sumRow(lines, tables_[r.table], r.size, values);
-        f(r.first, values);
-    }
-}
-
-
-void Foam::waveSum::sum
-(
-    const UList<amplitude>& amplitudes,
-    const latticeLayer& layer,
-    const use& f
-) const
-{
-    const auto centre = [&](const label i, const direction d)
-    {
-        return constant::mathematical::twoPi*(i + 0.5)/layer.n[d];
-    };
-
-    if (layerTable_.empty())
-    {
-        scalarField x(layer.n.x());
-        forAll(x, i)
-        {
-            x[i] = centre(i, vector::X);
-        }
-        layerTable_ = table(x);
-    }
-
-    List<amplitude> columns(columns_.size());
-    List<amplitude> lines(reach_ + 1);
-    scalarField values[vector::nComponents];
-
-    sumColumns(amplitudes, centre(layer.k, vector::Z), columns);
-    for (label y = 0; y < layer.n.y(); ++y)
-    {
-        sumLines(columns, centre(y, vector::Y), lines);
-        sumRow(lines, layerTable_, layer.n.x(), values);
-        f(y, values);
     }
 }

@@ -96,9 +96,9 @@ void Foam::fv::turbulenceForcing::start()
 }
 
 
-Foam::scalar Foam::fv::turbulenceForcing::energyAtForce(const scalar k) const
+Foam::scalar Foam::fv::turbulenceForcing::energyAtEnd(const scalar k) const
 {
-    if (explicit_ || !hasOld_)
+    if (!hasOld_)
     {
         return k;
     }
@@ -292,7 +292,6 @@ void Foam::fv::turbulenceForcing::beginRate(const flowStatistics& now)
             deltaTOld_ = mesh_.time().deltaTValue();
         }
         explicit_ = true;
-        choose(now);
     }
     follow(now);
 }

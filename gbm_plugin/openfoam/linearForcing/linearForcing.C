@@ -97,7 +97,7 @@ Foam::scalar Foam::fv::linearForcing::power(const flowStatistics& s) const
 
 void Foam::fv::linearForcing::choose(const flowStatistics& now)
 {
-    A_ = coefficient(energyAtForce(now.k));
+    A_ = coefficient(energyAtEnd(now.k));
 }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -78,7 +79,7 @@ def run(
 
 
 def _make(case: Path, folder: Path, preset: Preset, cells: int, times: dict, start: Path, ranks: int) -> None:
-    control = {"application": "boxFoam", "writeControl": "timeStep", "purgeWrite": 4, "functions": {}}
+    control = {"application": "boxFoam", "writeControl": "timeStep", "purgeWrite": 0, "functions": {}}
     force = f"variance {preset.variance!r}; timeScale {preset.time_scale!r}; cutoff {preset.cutoff!r}"
     copy_case(
         case,
@@ -121,7 +122,7 @@ def _write_force(path: Path, solver: SpectralSolver) -> None:
 
 
 class _Samples:
-    """The series of a run's written fields, kept as they come: older ones are deleted by the solver."""
+    """The series of a run's written fields; of those only the latest are kept, for a restart."""
 
     def __init__(self, folder: Path, out: Path, cells: int, viscosity: float):
         self.folder, self.out, self.cells, self.viscosity = folder, out, cells, viscosity
@@ -133,10 +134,11 @@ class _Samples:
 
     def take(self, ended: bool) -> None:
         """Sample the fields that are whole: all but the newest, until the solver has ended."""
-        times = numbered((processors(self.folder) or [self.folder])[0])
+        times = numbered(self._parts()[0])
         known = self.series["time"][-1] if len(self.series) else 0.0
-        whole = list(times.items()) if ended else list(times.items())[:-1]
-        new = [(t, path.name) for t, path in whole if t > known + 1e-9]
+        whole = [(t, path.name) for t, path in times.items()]
+        whole = whole if ended else whole[:-1]
+        new = [(t, name) for t, name in whole if t > known + 1e-9]
         if not new:
             return
         table = read_forcing(self.folder)
@@ -153,6 +155,14 @@ class _Samples:
             spectra=np.array(list(self.spectra.values())),
         )
 
+        for _, name in whole[:-1]:
+            for part in self._parts():
+                shutil.rmtree(part / name, ignore_errors=True)
+
+    def _parts(self) -> list[Path]:
+        """The folders that have the times."""
+        return processors(self.folder) or [self.folder]
+
     def write_spectrum(self, settle: float) -> None:
         """The average of E(k)."""
         late = [e for t, e in self.spectra.items() if t >= settle]
@@ -168,25 +178,26 @@ def _solve(folder: Path, ranks: int, samples: _Samples) -> None:
     stopped: list[int] = []
     handlers = {n: signal.signal(n, lambda *_: stopped.append(1)) for n in (signal.SIGINT, signal.SIGTERM)}
     log = log_file(folder, "boxFoam")
+    with log.open("a") as output:
+        solver = subprocess.Popen(
+            command("boxFoam", folder, ranks),
+            env=environment(),
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
     try:
-        with log.open("a") as output:
-            solver = subprocess.Popen(
-                command("boxFoam", folder, ranks),
-                env=environment(),
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
         while solver.poll() is None and not stopped:
             time.sleep(2)
             samples.take(ended=False)
-        if stopped:
+    finally:
+        if solver.poll() is None:
             os.killpg(solver.pid, signal.SIGTERM)
             solver.wait()
-            return
-    finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
+    if stopped:
+        raise RunError("stopped on request: the same command continues from what is written")
     samples.take(ended=True)
     if solver.returncode:
         raise RunError(f"boxFoam: {fatal_message(log) or f'exit code {solver.returncode}'} ({log})")
