@@ -87,6 +87,9 @@ def simulate(
     span = positive("end_time - start_time", end_time - start)
     if record_every is not None and (int(record_every) != record_every or record_every < 1):
         raise ValueError(f"record_every is {record_every}; it must be a whole number of at least 1, or None")
+    if not callable(getattr(flow, "sample", None)):
+        hint = "; gbm_plugin.flow.from_function(u) makes one of a function" if callable(flow) else ""
+        raise TypeError(f"{flow!r} is no flow: it has no sample(positions, time, need){hint}")
     words = (integrator, mobility, strain_coupling, tolerance, repulsion)
     group = Group([Stepper(family, start, *words) for family in families])
     run = (_OnceAStep if integrator == "ab3" else _own_times(flow) or _InParts)(group, flow, step)

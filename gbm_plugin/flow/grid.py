@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from ..compiled import kernel, only_read, part
 
 WORDS = ("trilinear", "cubic")
+LEAST_BOUNDED = 4  # values in each direction of a field that is not periodic
 
 
 @kernel
@@ -139,3 +140,14 @@ def gradient(velocity: NDArray, spacing: NDArray) -> NDArray:
         for j in range(3):
             add_derivative(velocity[i], j, spacing[j], 1.0, out[i, j])
     return out.reshape(9, *velocity.shape[1:])
+
+
+def extended(field: NDArray) -> NDArray:
+    """A bounded field (m, nx, ny, nz) with one more value at each end, from the cubic through the four there: between
+    its own values the periodic functions of this module then interpolate it, at the ends from one side."""
+    for axis in (1, 2, 3):
+        f = np.moveaxis(field, axis, 0)
+        low = 4 * f[0] - 6 * f[1] + 4 * f[2] - f[3]
+        high = 4 * f[-1] - 6 * f[-2] + 4 * f[-3] - f[-4]
+        field = np.moveaxis(np.concatenate([low[None], f, high[None]]), 0, axis)
+    return np.ascontiguousarray(field)

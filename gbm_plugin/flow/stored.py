@@ -22,9 +22,12 @@ class StoredFlow:
     """Velocity fields at given times, read as they are needed; in memory are only those around the latest time.
 
     times (T,) [s], increasing, at least two; read(i): the velocity (3, nx, ny, nz) [m/s] at times[i], whose value
-    [:, i, j, k] sits at origin + ((i, j, k) + offset) box/(nx, ny, nz): offset 0 for nodes, ½ for cell centres.
-    box, origin (3,) [m].
+    [:, i, j, k] sits at origin + ((i, j, k) + offset) box/(nx, ny, nz): offset 0 for nodes, ½ for cell centres. box,
+    origin (3,) [m].
+    steady: there is one field only, and it holds at all times.
 
+    periodic: False for a field that ends at its outermost values; box then reaches from the first to the last node
+    (offset 0), or over all cells (offset ½). There `inside` says of positions whether they are in it.
     in_time: "cubic" (through four fields, from one side near the ends; through all where there are fewer) or
     "linear". At a stored time the field itself is taken. interpolation in space: "trilinear", with derivatives
     by central differences at the nodes, interpolated alike; or "cubic", with the interpolant's own derivatives;
@@ -40,16 +43,20 @@ class StoredFlow:
         offset: float = 0.5,
         interpolation: str = "trilinear",
         in_time: str = "cubic",
+        periodic: bool = True,
+        steady: bool = False,
     ):
         self.times = np.array(times, dtype=float)
         self.box, self.origin = (np.array(v, dtype=float) for v in (box, origin))
         self.offset = float(offset)
         self.interpolation = one_of("interpolation", interpolation, grid.WORDS)
         self.in_time = one_of("interpolation in time", in_time, POINTS_IN_TIME)
+        self.periodic = bool(periodic)
+        self.inside = None if periodic else self._inside
         self._read = read
         self._fields: dict[int, dict[str, NDArray]] = {}
         self._shape: tuple[int, ...] | None = None
-        if self.times.ndim != 1 or len(self.times) < 2:
+        if self.times.ndim != 1 or len(self.times) < 2 - bool(steady):
             raise ValueError(
                 f"fields at {self.times.size} times are stored; at least 2 are needed to interpolate"
             )
@@ -71,11 +78,11 @@ class StoredFlow:
     def sample(
         self, positions: ArrayLike, time: float, need: str = "gradient"
     ) -> tuple[NDArray, NDArray | None]:
-        """Velocity (..., 3) at positions (..., 3), which may lie outside of the box, and what need asks for.
+        """Velocity (..., 3) at positions (..., 3), which may lie outside of a periodic box, and what need asks for.
 
         need: "velocity" (extra is None), "rotation" (½∇×u, (..., 3)) or "gradient" ((..., 3, 3), [..., i, j] =
-        du_i/dx_j). ValueError for a time that is not in the stored range or a field of another shape,
-        FloatingPointError for a field or position that is not finite.
+        du_i/dx_j). ValueError for a time that is not in the stored range, a position outside of a bounded field or a
+        field of another shape, FloatingPointError for a field or position that is not finite.
         """
         one_of("need", need, NEEDS)
         positions = np.asarray(positions, dtype=float)
@@ -85,7 +92,9 @@ class StoredFlow:
             raise FloatingPointError(f"a position at time {time:g} is not finite")
         numbers, weights = self._stencil(time)
         fields = [self._field(n, "velocity") for n in numbers]
-        points = (positions.reshape(-1, 3) - self.origin) * (self._shape[1:] / self.box) - self.offset
+        if self.inside is not None and not (within := self.inside(positions)).all():
+            raise ValueError(f"the flow is not known at {positions[~within][0]}")
+        points = self._in_cells(positions.reshape(-1, 3))
         parts = (grid.on_grid(self.interpolation, field, points) for field in fields)
         velocity = sum(w * part for w, part in zip(weights, parts, strict=True)).reshape(positions.shape)
         if need == "velocity":
@@ -95,18 +104,40 @@ class StoredFlow:
         tail = (3, 3) if need == "gradient" else (3,)
         return velocity, extra.reshape(*positions.shape[:-1], *tail)
 
+    @property
+    def _cells(self) -> NDArray:
+        """Intervals between values that the box is wide in each direction."""
+        shape = np.array(self._known_shape[1:])
+        return shape if self.periodic or self.offset else shape - 1
+
+    @property
+    def _known_shape(self) -> tuple[int, ...]:
+        """Of the fields, the first of which is read if none was."""
+        if self._shape is None:
+            self._field(0, "velocity")
+        return self._shape
+
+    def _in_cells(self, points: NDArray) -> NDArray:
+        """Points (P, 3) in units of cells from the first value in memory."""
+        return (points - self.origin) * (self._cells / self.box) - (self.offset - (not self.periodic))
+
+    def _inside(self, positions: ArrayLike) -> NDArray:
+        """Whether positions (..., 3) are between the values of a bounded field: (...,)."""
+        points = (np.asarray(positions) - self.origin) * (self._cells / self.box) - self.offset
+        return ((points >= 0) & (points <= np.array(self._known_shape[1:]) - 1)).all(axis=-1)
+
     def _derivative(self, number: int, need: str, points: NDArray) -> NDArray:
         """Rotation (P, 3) or gradient (P, 9 or 3, 3) of one stored field at points in units of cells."""
         if self.interpolation == "trilinear":
             return grid.on_grid("trilinear", self._field(number, need), points)
-        g = grid.cubic_gradient(self._field(number, "velocity"), points, self.box / self._shape[1:])
-        if need == "gradient":
-            return g
-        return rotation_of(g)
+        g = grid.cubic_gradient(self._field(number, "velocity"), points, self.box / self._cells)
+        return g if need == "gradient" else rotation_of(g)
 
     def _stencil(self, time: float) -> tuple[list[int], list[float]]:
         """Which fields make that of a time, and their weights. Forgets the fields that are far from it."""
         times = self.times
+        if len(times) == 1:
+            return [0], [1.0]
         near = int(np.argmin(np.abs(times - time)))
         slack = SAME_TIME * np.diff(times[max(0, near - 1) : near + 2]).min()
         at_field = abs(times[near] - time) <= slack
@@ -128,19 +159,20 @@ class StoredFlow:
         """velocity, rotation or gradient at one of the stored times, components first."""
         kept = self._fields.setdefault(number, {})
         if "velocity" not in kept:
-            kept["velocity"] = self._velocity(number)
+            velocity = self._velocity(number)
+            kept["velocity"] = velocity if self.periodic else grid.extended(velocity)
         if name not in kept:
-            spacing = self.box / self._shape[1:]
-            kept[name] = getattr(grid, name)(kept["velocity"], spacing)
+            kept[name] = getattr(grid, name)(kept["velocity"], self.box / self._cells)
         return kept[name]
 
     def _velocity(self, number: int) -> NDArray:
         velocity = np.ascontiguousarray(self._read(number), dtype=float)
         shape, time = velocity.shape, self.times[number]
-        if self._shape is None and len(shape) == 4 and shape[0] == 3 and min(shape) > 0:
+        least = 1 if self.periodic else grid.LEAST_BOUNDED
+        if self._shape is None and len(shape) == 4 and shape[0] == 3 and min(shape[1:]) >= least:
             self._shape = shape
         if shape != self._shape:
-            needed = self._shape or "(3, nx, ny, nz)"
+            needed = self._shape or f"(3, nx, ny, nz), {least} or more in each direction,"
             raise ValueError(f"the velocity stored at time {time:.9g} has shape {shape}; {needed} is needed")
         if not np.isfinite(velocity.sum()) and not np.isfinite(velocity).all():
             component, *cell = np.argwhere(~np.isfinite(velocity))[0].tolist()

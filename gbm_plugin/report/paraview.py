@@ -5,7 +5,9 @@ XDMF is not used: meshio's reader, and so a check, knows neither a slice of an H
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
 import meshio
@@ -17,19 +19,30 @@ from ..output.recording import Recording
 from ..statistics.fibers import curvature
 from .vtp import Polylines, write_vtp
 
+if TYPE_CHECKING:
+    from ..fiber import Trajectory
+
 FAR, LONG = 1e9, 1e3  # no bead is so many boxes away, and no link is so many long
 
 
-def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Path:
-    """Write all times of a recording as moving polylines; returns the .pvd to open. ParaView's filter Tube, with
-    "Vary Radius: By Absolute Scalar" and the array radius, shows them as they are.
+def write_series(
+    recording: Recording | Trajectory | Sequence[Trajectory],
+    folder: Path | str,
+    wrapped: bool = False,
+    box: ArrayLike | None = None,
+) -> Path:
+    """Write all times of a recording, or of what `simulate` gave, as moving polylines; returns the .pvd to open.
+    ParaView's filter Tube, with "Vary Radius: By Absolute Scalar" and the array radius, shows them as they are.
 
+    box: widths [m] of the periodic box, three or one, of trajectories that are wrapped; a recording has its own.
     wrapped: every fiber cut at the faces of the periodic box and each piece shifted into it; otherwise fibers
     are whole, where they were carried. Point data: curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two
     beads), velocity [m/s] (differences between records), radius [m], stiffness K^b [N m2], family (its number), fiber
     (unique over the families), bead (index; fractional at a cut). Data of each line: family, fiber.
     Replaces a series that is there. Raises OSError if it cannot be written.
     """
+    if not isinstance(recording, Recording):
+        recording = _of_trajectories(recording, box, wrapped)
     name = "wrapped" if wrapped else "unwrapped"
     pieces = Path(folder) / name
     pieces.mkdir(parents=True, exist_ok=True)
@@ -51,7 +64,48 @@ def write_series(recording: Recording, folder: Path | str, wrapped: bool) -> Pat
     return path
 
 
-def polylines(recording: Recording, row: int, wrapped: bool) -> Polylines:
+class _Moving(NamedTuple):
+    """A family of a trajectory, as a recording has it."""
+
+    positions: NDArray
+    radius: float
+    bending_stiffness: NDArray
+    count: int
+    beads: int
+
+
+class _Trajectories(NamedTuple):
+    """Trajectories of one flow, as a recording has them."""
+
+    times: NDArray
+    families: dict[str, _Moving]
+    box_origin: NDArray
+    box_size: NDArray | None
+
+
+def _of_trajectories(given: Trajectory | Sequence[Trajectory], box, wrapped: bool) -> _Trajectories:
+    paths = list(given) if isinstance(given, Sequence) else [given]
+    if wrapped and box is None:
+        raise ValueError("trajectories know no box: give box to wrap them")
+    if any(not np.array_equal(path.times, paths[0].times) for path in paths):
+        raise ValueError(
+            "the trajectories are of different times; families that simulate moves together are not"
+        )
+    families = {
+        str(number): _Moving(
+            path.positions,
+            path.fibers.radius,
+            path.fibers.bending_stiffness,
+            path.fibers.count,
+            path.fibers.beads,
+        )
+        for number, path in enumerate(paths)
+    }
+    size = None if box is None else np.broadcast_to(np.asarray(box, dtype=float), (3,))
+    return _Trajectories(paths[0].times, families, np.zeros(3), size)
+
+
+def polylines(recording: Recording | _Trajectories, row: int, wrapped: bool) -> Polylines:
     """All fibers at the `row`-th time, with the data of `write_series`."""
     parts, first = [], 0
     for number, family in enumerate(recording.families.values()):

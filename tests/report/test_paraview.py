@@ -8,8 +8,10 @@ import meshio
 import numpy as np
 import pytest
 
+from gbm_plugin import Fibers, simulate
+from gbm_plugin.flow import LinearFlow
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
-from gbm_plugin.report.paraview import cut_at_faces, line_mesh, write_series
+from gbm_plugin.report.paraview import _of_trajectories, cut_at_faces, line_mesh, polylines, write_series
 from gbm_plugin.statistics.fibers import curvature
 
 from sample_records import BOX, FAMILIES, SCENE, records
@@ -184,3 +186,22 @@ def test_other_formats_through_meshio(tmp_path, write):
     back = meshio.read(tmp_path / "fibers.vtu")
     np.testing.assert_array_equal(back.points, mesh.points)
     np.testing.assert_array_equal(back.point_data["curvature"], mesh.point_data["curvature"])
+
+
+def test_a_series_of_trajectories(tmp_path):
+    """Families that simulate moved together, whole and wrapped: ends of the polylines are where the beads are."""
+    families = [Fibers.straight(3, n, 1.0, 1e-3, 1.0, box=2.0, seed=n) for n in (4, 6)]
+    flow = LinearFlow(np.zeros((3, 3)), (1.0, 0, 0))
+    paths = simulate(families, flow, 0.5, 2.0, record_every=1)
+    for wrapped in (False, True):
+        series = write_series(paths, tmp_path, wrapped, box=2.0)
+        files = [d.get("file") for d in ElementTree.parse(series).iter("DataSet")]
+        assert len(files) == 5
+    lines = polylines(_of_trajectories(paths, None, False), 4, wrapped=False)
+    beads = np.concatenate([path.positions[4].reshape(-1, 3) for path in paths])
+    np.testing.assert_array_equal(lines.points, beads)
+    np.testing.assert_allclose(
+        lines.point_data["velocity"], np.tile([1.0, 0, 0], (len(beads), 1)), atol=1e-12
+    )
+    with pytest.raises(ValueError, match="give box to wrap them"):
+        write_series(paths[0], tmp_path, wrapped=True)
