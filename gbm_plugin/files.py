@@ -85,5 +85,5 @@ def private_folder(path: Path) -> Path:
 
 
 def _opened(path: Path, mode: str, private: bool, **options) -> IO:
-    access = os.O_RDWR if "+" in mode else os.O_WRONLY
+    access = (os.O_RDWR if "+" in mode else os.O_WRONLY) | (os.O_APPEND if "a" in mode else 0)
     return os.fdopen(os.open(path, _NEW | access, 0o600 if private else 0o666), mode, **options)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import shutil
 from dataclasses import asdict
 
 from ..scales import kolmogorov_length
+from .disk import needed, readable
 from .scene import Family, Scene
 
 # beyond these a bead is no longer a passive point of the flow around it
@@ -31,7 +33,15 @@ def figures(scene: Scene) -> dict:
         flow["cell_size"] = max(b / n for b, n in zip(scene.box, scene.cells, strict=True))
         if dissipation:
             flow["cell_over_eta"] = flow["cell_size"] / flow["kolmogorov_length"]
-    return {"flow": flow, "families": {f.name: _family(f, scene, dissipation) for f in scene.families}}
+    families = {f.name: _family(f, scene, dissipation) for f in scene.families}
+    return {"flow": flow, "families": families, "disk": _disk(scene)}
+
+
+def _disk(scene: Scene) -> dict:
+    """What a run from startTime writes, and what is free [bytes]."""
+    disk = needed(scene) | {"free": shutil.disk_usage(scene.case).free}
+    short = disk["total"] > disk["free"]
+    return disk | {"remarks": ["the disk has not the room for all that this run writes"] if short else []}
 
 
 def _kolmogorov(scene: Scene, dissipation: float | None) -> float | None:
@@ -98,6 +108,9 @@ def describe(result: dict) -> str:
         lines.append(f"    {'forcing':<28}{flow['forcing']['type']}: {words}")
     for name, values in result["families"].items():
         table(f"family {name}", values)
+    disk = result["disk"]
+    sizes = {name: readable(size) for name, size in disk.items() if name != "remarks"}
+    table("disk, about", sizes | {"remarks": disk["remarks"]})
     return "\n".join(lines)
 
 

@@ -1,13 +1,36 @@
-"""What the log of a solver says of a run, read by PyFoam."""
+"""The log of a solver: what it says of a run, read by PyFoam, and how it is kept from growing without bound."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 from PyFoam.LogAnalysis.ContinuityLineAnalyzer import GeneralContinuityLineAnalyzer
 from PyFoam.LogAnalysis.ExecutionTimeLineAnalyzer import GeneralExecutionLineAnalyzer
 from PyFoam.LogAnalysis.FoamLogAnalyzer import FoamLogAnalyzer
+
+MOST = 32 << 20  # bytes of a log, beyond which its middle is left out
+HEAD, TAIL = 64 << 10, 8 << 20  # what is kept of it
+GAP = "bytes left out by gbm run"
+
+
+def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> None:
+    """Cut the middle out of a log that has more than `most` bytes, and that another process appends to (O_APPEND)."""
+    if log.stat().st_size <= most:
+        return
+    with log.open("a+b") as file:
+        file.seek(0)
+        first = file.read(head)
+        first = first[: first.rfind(b"\n") + 1]
+        start = file.seek(-tail, os.SEEK_END)
+        last = file.read()
+        cut = last.find(b"\n") + 1
+        end = file.tell()
+        gap = f"\n[... {start + cut - len(first)} {GAP} ...]\n".encode()
+        newest = os.pread(file.fileno(), most, end)  # what came meanwhile
+        file.truncate(0)
+        file.write(first + gap + last[cut:] + newest)
 
 
 def summary(log: Path) -> str | None:
@@ -21,4 +44,8 @@ def summary(log: Path) -> str | None:
     if not len(steps):
         return None
     error = np.max(np.abs(analyzer.getAnalyzer("continuity").lines.getValues("Global")), initial=0.0)
-    return f"{len(steps)} steps, {np.median(steps):.3g} s of CPU each; continuity errors below {error:.1e}"
+    with log.open(errors="replace") as lines:
+        some = "the last " if GAP in lines.read(2 * HEAD) else ""
+    return (
+        f"{some}{len(steps)} steps, {np.median(steps):.3g} s of CPU each; continuity errors below {error:.1e}"
+    )

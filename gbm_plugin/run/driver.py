@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..case.disk import Room
 from ..case.initial import write_velocity
 from ..case.layout import STATE_FILE, results
 from ..case.scene import Scene
@@ -77,6 +78,8 @@ class Run:
 
     def __init__(self, scene: Scene, carrier: Carrier, start: Start):
         self.scene, self.carrier, self.start = scene, carrier, start
+        self._room = Room(scene)
+        self._room.look(start.time)
         folders = [scene.case.parent / name for name in ("0.orig", "0")]
         self.template = next((f / "U" for f in folders if (f / "U").is_file()), None)
         if self.template is None:
@@ -143,6 +146,7 @@ class Run:
     def _save(self) -> None:
         """U at the cell centres for whoever reads the folder as a case, then the states, complete with the last."""
         time = self.fleet.time
+        self._room.look(time)
         folder = self.scene.case / _name(time)
         write_velocity(self.template, folder / "U", self.carrier.on_cells(time))
         self.carrier.save(folder)

@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..case.layout import log_file
+from ..case.disk import Room
+from ..case.layout import FIBERS, log_file
 from ..case.lock import DAEMON, RUN, locked
-from ..case.log import summary
+from ..case.log import shorten, summary
 from ..case.openfoam import command, environment, fatal_message
 from ..case.prepare import prepare, ranks_of, reconstruct
 from ..case.scene import Scene, read_scene
@@ -26,13 +27,14 @@ from ..errors import RunError
 from ..files import created
 from ..output.restarts import keep_earlier
 from .driver import COMPLETE
-from .progress import Progress
+from .progress import Progress, newest_row
 from .standstill import Pulse, kill_session, where_it_stands
 from .words import closing, opening
 
 log = logging.getLogger(__name__)
 
 STOPPED = "stopped on request; everything is written: the same command continues"
+LOOK = 10.0  # how often the room on the disk is looked at [s]
 GRACE = 5.0  # how long one side may outlive the other that failed, before it is ended [s]
 FULL = 1 << 20  # a disk with less room may be why OpenFOAM failed [bytes]
 
@@ -132,6 +134,7 @@ class _Processes:
         self.daemons = [_Daemon(self.case, share) for share in all_shares(scene.coupling.daemons)]
         self.solver_log = log_file(self.case, scene.application)
         self.lock = lock
+        self._room, self._next_look = Room(scene), 0.0
         self.solver: subprocess.Popen | None = None
         self.stopping = 0
         self.ended_here: set[subprocess.Popen] = set()  # by this process, after another one's end
@@ -159,7 +162,7 @@ class _Processes:
 
     def _start(self, argv: list[str], log_file: Path, **variables: str) -> subprocess.Popen:
         keep_earlier(log_file)
-        with created(log_file) as output:
+        with created(log_file, "a") as output:  # which `shorten` may cut
             return subprocess.Popen(
                 argv,
                 env=environment() | variables,
@@ -199,6 +202,8 @@ class _Processes:
             while any(process.poll() is None for process in everyone):
                 time.sleep(0.1)
                 progress.update()
+                shorten(self.solver_log)
+                self._look_after_room()
                 if all(process.poll() is None for process in everyone):
                     if pulse.silence() > limit:
                         self.standstill = self._where_all_stand(limit)
@@ -213,6 +218,11 @@ class _Processes:
                 elif time.monotonic() - alone_since > grace:
                     break
             progress.update()
+
+    def _look_after_room(self) -> None:
+        if time.monotonic() >= self._next_look:
+            self._next_look = time.monotonic() + LOOK
+            self._room.look(newest_row(self.case, f"{FIBERS}/*/daemon*.dat").get("Time", self.start_time))
 
     def _where_all_stand(self, seconds: float) -> str:
         sides = [(self.scene.application, self.solver, self.solver_log)]

@@ -1,0 +1,92 @@
+"""What a run takes on the disk: estimated before, looked after while it goes on, and logs that end somewhere."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections import namedtuple
+
+import pytest
+
+from gbm_plugin.case import disk
+from gbm_plugin.case.disk import Room, needed, readable
+from gbm_plugin.case.info import describe, figures
+from gbm_plugin.case.log import GAP, shorten, summary
+from gbm_plugin.case.scene import read_scene
+from gbm_plugin.files import created
+
+from conftest import make_case, run_case, set_entry
+
+Usage = namedtuple("Usage", "total used free")
+STEP = "Time = {0}\ntime step continuity errors : sum local = 1e-9, global = 2e-19, cumulative = 0\n"
+STEP += "ExecutionTime = {0} s  ClockTime = {0} s\n\n"
+
+
+def size(*folders):
+    return sum(p.stat().st_size for folder in folders for p in folder.rglob("*") if p.is_file())
+
+
+@pytest.mark.openfoam
+def test_the_estimate_is_what_a_run_writes(tmp_path):
+    """Within a fifth, of fields and of the whole, where fields and beads are more than headers."""
+    family = "test { count 500; beads 10; length 1.2; bendingStiffness 1e-4; seed 3; }"
+    case = make_case(tmp_path / "case", cells=20, steps=8, write_every=4, families=family, tight=False)
+    about = needed(read_scene(case))
+    run_case(case)
+    folders = [case / "0.08", case / "0.16"]
+    assert about["time_folders"] == pytest.approx(size(*folders), rel=0.2)
+    assert about["recording"] == pytest.approx(size(case / "postProcessing/fibers"), rel=0.2)
+
+
+def test_formats_and_what_is_purged(tmp_path):
+    case = make_case(tmp_path / "case", cells=20, steps=1000, write_every=10, prepared=False)
+    whole = needed(read_scene(case))
+    assert whole["time_folders"] == pytest.approx(100 * whole["time_folder"], rel=1e-3)
+    set_entry(case / "system/controlDict", "purgeWrite", "2")
+    assert needed(read_scene(case))["time_folders"] == pytest.approx(2 * whole["time_folder"], rel=1e-3)
+    set_entry(case / "system/controlDict", "writeFormat", "ascii")
+    assert needed(read_scene(case))["time_folder"] > 1.5 * whole["time_folder"]
+    late = needed(read_scene(case), start=read_scene(case).end_time)
+    assert late["total"] == 0
+
+
+def test_a_word_before_the_disk_is_full(tmp_path, monkeypatch, caplog):
+    scene = read_scene(make_case(tmp_path / "case", cells=20, steps=1000, write_every=10, prepared=False))
+    need, room = needed(scene), Room(scene)
+    free = {"now": 10 * need["total"]}
+    monkeypatch.setattr(disk.shutil, "disk_usage", lambda _: Usage(0, 0, free["now"]))
+    said = []
+    for now in (10 * need["total"], 0.5 * need["total"], 0.4 * need["total"], need["time_folder"], 0):
+        free["now"] = now
+        room.look(0.0)
+        said.append(len(caplog.records))
+    assert said == [0, 1, 1, 2, 2]
+    assert f"{readable(0.5 * need['total'])} left" in caplog.records[0].getMessage()
+    assert "not the room" in describe(figures(scene))
+
+
+def test_a_log_that_another_process_writes_is_shortened(tmp_path):
+    """Beginning, end and every line that comes later are kept; a second cut tells of the first."""
+    log = tmp_path / "log.pimpleFoam"
+    write = "import sys\nfor n in range(30000): print(f'line {n:06d}', flush=n % 100 == 99)\n"
+    with created(log, "a") as output:
+        child = subprocess.Popen([sys.executable, "-c", write], stdout=output)
+    cuts = 0
+    while child.poll() is None:
+        if log.stat().st_size > 60_000:
+            shorten(log, 60_000, 2000, 20_000)
+            cuts += 1
+    lines = log.read_text().splitlines()
+    assert cuts > 1 and log.stat().st_size < 200_000
+    assert lines[:3] == ["line 000000", "line 000001", "line 000002"] and lines[-1] == "line 029999"
+    assert sum(GAP in line for line in lines) == 1
+    tail = [int(line.split()[1]) for line in lines[-1000:]]
+    assert tail == sorted(tail)
+
+
+def test_the_summary_says_what_it_saw(tmp_path):
+    log = tmp_path / "log"
+    log.write_text("".join(STEP.format(n) for n in range(1, 2001)))
+    assert summary(log).startswith("2000 steps")
+    shorten(log, 20_000, 2000, 5000)
+    assert summary(log).startswith("the last ")
