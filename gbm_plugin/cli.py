@@ -192,11 +192,17 @@ def _report(arguments) -> dict:
 
 
 def _info(arguments) -> dict:
+    from .case.check import notes
     from .case.info import describe, figures
+    from .case.mesh import difference
     from .case.scene import read_scene
 
-    result = figures(read_scene(arguments.case))
+    scene = read_scene(arguments.case)
+    result = figures(scene)
     print(describe(result))
+    result["notes"] = [*notes(scene), *filter(None, [difference(scene.case)])]
+    for note in result["notes"]:
+        print(f"note: {note}")
     return result
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from ..case.check import check_forcing, check_mesh, check_openfoam, notes
 from ..case.disk import Room
 from ..case.layout import FIBERS, cause_file, log_file
 from ..case.lock import DAEMON, RUN, locked
@@ -53,6 +54,7 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
     """
     case = Path(case).resolve()
     scene = read_scene(case)
+    check_openfoam(scene)
     ranks = ranks_of(case, parallel)
     with _only_run(case) as lock:
         start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh, scene.start_from)
@@ -61,6 +63,10 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
             log.info(COMPLETE, start.time)
             return
         scene = prepare(scene, start, ranks)
+        check_mesh(case)
+        check_forcing(scene, f"{start.time:.12g}")
+        for note in notes(scene):
+            log.info("note: %s", note)
         _remove_addresses(case)
         opening(scene, start.time, f"; see log.{scene.application} and log.gbmDaemon in {case}")
         _Processes(scene, ranks, start.time, lock).run()
