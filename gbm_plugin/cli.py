@@ -186,6 +186,8 @@ def _report(arguments) -> dict:
     print("\n".join(summary(arguments.case)))
     folder = Path(arguments.case) / "report"
     print(f"written to {folder}: {' '.join(result['files'])}")
+    for change in result["changes"]:
+        print(f"changed at t = {change['time']:g} (dotted in the figures): {', '.join(change['changes'])}")
     for reason in result["not_drawn"]:
         print(f"not drawn: {reason}")
     return result

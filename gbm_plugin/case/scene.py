@@ -348,6 +348,7 @@ def _texts(case: Path) -> dict[str, str]:
     names = (
         "constant/fiberProperties",
         "constant/transportProperties",
+        "constant/turbulenceProperties",
         "constant/fvOptions",
         "system/controlDict",
         "system/fvSchemes",

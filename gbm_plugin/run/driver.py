@@ -22,6 +22,7 @@ from ..errors import CaseError, RunError
 from ..fleet.fleet import Fleet
 from ..fleet.journal import Journal
 from ..signals import Asked, handled
+from .continued import compare
 from .progress import Progress
 from .words import closing, opening
 
@@ -88,6 +89,7 @@ class Run:
             )
         self.fleet = Fleet.seeded(scene, scene.origin, np.add(scene.origin, scene.box), start.time)
         if start.continues:
+            compare(scene)
             folder = scene.case / _name(start.time)
             carrier.restore(folder, start.time)
             self.fleet.restore(folder)

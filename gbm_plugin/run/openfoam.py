@@ -28,6 +28,7 @@ from ..errors import RunError, Stopped
 from ..files import created
 from ..output.restarts import keep_earlier
 from ..signals import TELL, Asked, handled, kept_from_children
+from .continued import compare
 from .driver import COMPLETE
 from .progress import Progress, newest_row
 from .standstill import Pulse, kill_session, where_it_stands
@@ -62,6 +63,8 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
             reconstruct(case)
             log.info(COMPLETE, start.time)
             return
+        if start.continues:
+            compare(scene)
         scene = prepare(scene, start, ranks)
         check_mesh(case)
         check_forcing(scene, f"{start.time:.12g}")
