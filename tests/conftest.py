@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +23,8 @@ from gbm_plugin.output.recording import Recorder
 from sample_records import FAMILIES, SCENE, records
 
 pytest_plugins = ("selection", "hang")
+
+os.environ.update(OMPI_MCA_mpi_yield_when_idle="1")  # ranks that wait leave their core to others
 
 DEFAULT_CASE = Path(__file__).parents[1] / "openfoam_case"
 
@@ -69,7 +74,7 @@ def make_case(
     time_step: float = 0.02,
     write_every: int = 10,
     transport: str = "socket",
-    timeout: float = 60,
+    timeout: float = 300,
     interpolation: str = "trilinear",
     integrator: str = "ab3",
     families: str = FAMILY,
@@ -103,9 +108,26 @@ def make_case(
     )
     (path / "constant/fiberProperties").write_text(HEADER + words)
     if prepared:
+        prepare(path)
+    return path
+
+
+_store = tempfile.TemporaryDirectory(prefix="gbm-tests-")
+
+
+def prepare(path: Path) -> None:
+    """Mesh and initial fields; a copy, where a case before had the same."""
+    words = "".join((path / "system" / name).read_text() for name in ("blockMeshDict", "initialFieldDict"))
+    kept = Path(_store.name) / hashlib.sha256(words.encode()).hexdigest()
+    parts = ("constant/polyMesh", "0")
+    if kept.is_dir():
+        for part in parts:  # newer than the dictionaries, or a run would make them again
+            shutil.copytree(kept / part, path / part, copy_function=shutil.copyfile)
+    else:
         make_mesh(path)
         initial_fields(read_scene(path))
-    return path
+        for part in parts:
+            shutil.copytree(path / part, kept / part)
 
 
 def divide(case: Path, ranks: int, n: tuple | None) -> None:
@@ -142,7 +164,6 @@ def gbm(*arguments: str, **options) -> subprocess.CompletedProcess:
         [sys.executable, "-m", "gbm_plugin.cli", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=300,
         **options,
     )
 

@@ -117,7 +117,7 @@ def test_neither_bombs_nor_pipes_nor_folders(tmp_path):
 
 def foam(case, program, *options):
     argv = [program, "-case", case, *options]
-    subprocess.run(argv, env=environment(), check=True, capture_output=True, timeout=60)
+    subprocess.run(argv, env=environment(), check=True, capture_output=True)
 
 
 @pytest.fixture(scope="module")

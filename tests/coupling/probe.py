@@ -47,7 +47,7 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
                 samples[step] = (message.time, *decode_sample(message, len(positions), need))
                 step += 1
             channel.close()
-        assert solver.wait(30) == 0, (case / "log.pimpleFoam").read_text()[-3000:]
+        assert solver.wait() == 0, (case / "log.pimpleFoam").read_text()[-3000:]
     finally:
         solver.kill()
     return hello, samples

@@ -166,7 +166,7 @@ def test_a_time_without_one_of_the_states_is_not_complete(tmp_path, one):
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_one_of_two_is_killed(tmp_path, ranks):
-    case = make(tmp_path / "case", 2, ranks, timeout=5)
+    case = make(tmp_path / "case", 2, ranks)
     set_entry(case / "system/controlDict", "endTime", "1000")
     run = start_gbm("run", case, *(["--parallel"] if ranks > 1 else []))
     try:
@@ -174,7 +174,7 @@ def test_one_of_two_is_killed(tmp_path, ranks):
         victim = next(pid for pid in _daemons(run.pid) if _words(pid)[-1] == "2")
         others = [pid for pid in (*_daemons(run.pid), children(run.pid)["solver"]) if pid != victim]
         os.kill(victim, signal.SIGKILL)
-        output, _ = run.communicate(timeout=60)
+        output, _ = run.communicate()
         assert run.returncode == 1
         errors = [line for line in output.splitlines() if line.startswith("gbm run: ")]
         assert len(errors) == 1 and "daemon 2 of 2 was ended by SIGKILL" in errors[0], output
@@ -224,8 +224,8 @@ def test_a_solver_that_counts_other_daemons(tmp_path, one):
         until(lambda: (case / "gbm.1of2.sock").exists(), "the daemon's socket")
         use_daemons(case, 1)
         (case / "gbm.sock").symlink_to("gbm.1of2.sock")
-        assert start_solver(case).wait(30) == 1
-        output, _ = daemon.communicate(timeout=30)
+        assert start_solver(case).wait() == 1
+        output, _ = daemon.communicate()
         assert "OpenFOAM takes this for the daemon, and it is daemon 1 of 2" in output
     finally:
         daemon.kill()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import socket
@@ -10,6 +11,7 @@ import stat
 import subprocess
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -37,45 +39,59 @@ from fakes import (
 
 pytestmark = pytest.mark.openfoam
 
-TIMEOUT = 1.5
+PATIENT, IMPATIENT = 300, 3  # s: of a case whose fault shows at once, and of one whose fault is silence
 NAN = float("nan")
 
 
 @pytest.fixture(scope="module")
-def prepared(tmp_path_factory):
-    """A case that is only read from: faults before the first step end leave nothing in it that matters."""
-    return make_case(tmp_path_factory.mktemp("prepared") / "case", timeout=TIMEOUT, tight=False)
-
-
-@pytest.fixture(scope="module")
-def by_transport(prepared):
-    """The same for each transport."""
-    cases = {"socket": prepared}
-    for transport in ("tcp", "file"):
-        case = cases[transport] = prepared.with_name(transport)
-        shutil.copytree(prepared, case, ignore=shutil.ignore_patterns("log.*", "postProcessing", "gbm.*"))
-        properties = case / "constant/fiberProperties"
-        properties.write_text(properties.read_text().replace("transport socket", f"transport {transport}"))
-    return cases
-
-
-@pytest.fixture(scope="module")
-def patient(prepared):
-    """The same with a timeout that other processes' start does not exceed."""
-    case = prepared.with_name("patient")
-    shutil.copytree(prepared, case)
-    properties = case / "constant/fiberProperties"
-    properties.write_text(properties.read_text().replace(f"timeout {TIMEOUT:g}", "timeout 30"))
-    return case
+def original(tmp_path_factory):
+    """To be copied."""
+    return make_case(tmp_path_factory.mktemp("original") / "case", timeout=PATIENT, tight=False)
 
 
 @pytest.fixture
-def long_case(prepared, tmp_path):
+def copy(original, tmp_path):
+    """A case of one's own, with another transport and timeout."""
+
+    def make(transport: str = "socket", timeout: float = PATIENT, name: str = "case"):
+        case = shutil.copytree(original, tmp_path / name)
+        set_coupling(case, transport, timeout)
+        return case
+
+    return make
+
+
+def set_coupling(case, transport: str, timeout: float) -> None:
+    properties = case / "constant/fiberProperties"
+    words = f"coupling {{ transport {transport}; timeout {timeout:g}; }}"
+    text, found = re.subn(r"coupling \{.*?\}", words, properties.read_text())
+    assert found == 1
+    properties.write_text(text)
+
+
+@pytest.fixture
+def prepared(copy):
+    return copy()
+
+
+@pytest.fixture
+def silence(copy) -> float:
+    """A timeout that both sides of a real run keep while they start: some times what a daemon takes to listen at
+    the load of the moment [s]."""
+    case = copy(name="start")
+    began = time.monotonic()
+    daemon = start_gbm("daemon", case)
+    until((case / "gbm.sock").exists, "the socket")
+    taken = time.monotonic() - began
+    daemon.terminate()
+    daemon.communicate()
+    return round(max(IMPATIENT, 5 * taken), 1)
+
+
+@pytest.fixture
+def long_case(prepared):
     """A run that does not end by itself."""
-    case = tmp_path / "case"
-    shutil.copytree(
-        prepared, case, ignore=shutil.ignore_patterns("log.*", "postProcessing", "gbm.*", "exchange")
-    )
+    case = prepared
     set_entry(case / "system/controlDict", "endTime", "1000")
     set_entry(case / "system/controlDict", "writeInterval", "5")
     yield case
@@ -153,7 +169,7 @@ SOLVER_FAULTS = {
         lambda s: s.raw(Message(Kind.ERROR, 4, 0.08, b"out of coffee").encode()),
         "stopped: out of coffee",
     ),
-    "silence": (lambda s: None, f"OpenFOAM was silent for {TIMEOUT} s"),
+    "silence": (lambda s: None, f"OpenFOAM was silent for {IMPATIENT} s"),
     "half a message, then silence": (lambda s: s.raw(s.sample(4).encode()[:500]), "was silent"),
 }
 
@@ -173,22 +189,19 @@ SOLVER_FAULTS_IN_FILES = {"two in one": (lambda s: s.raw(2 * s.sample(4).encode(
     + [("tcp", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, "half a message, then silence")]
     + [("file", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, *SOLVER_FAULTS_IN_FILES)],
 )
-def test_daemon_with_a_solver_that_is(transport, fault, by_transport):
-    prepared = by_transport[transport]
+def test_daemon_with_a_solver_that_is(transport, fault, copy):
+    prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT)
     misbehave, expected = (SOLVER_FAULTS | SOLVER_FAULTS_IN_FILES)[fault]
     if transport == "file":
         expected = IN_FILES.get(fault, expected)
-    shutil.rmtree(prepared / "postProcessing", ignore_errors=True)
     with FakeSolver(prepared) as solver:
         solver.connect()
         solver.serve_until(4)
-        began = time.monotonic()
         misbehave(solver)
         if solver.socket.fileno() >= 0 and fault != "error":
             assert expected in solver.last_word()
             solver.close()
         line = one_line(solver.daemon, "daemon")
-        assert time.monotonic() - began < TIMEOUT + 3
     assert expected in line and str(prepared / "log.pimpleFoam") in line
     assert records(prepared) == (5 if fault == "duplicated" else 4)
     assert not solver.address.exists()
@@ -317,7 +330,7 @@ DAEMON_FAULTS = {
         _after_greeting(lambda n: Message(Kind.ERROR, 0, 0.0, b"out of tea").encode()),
         "the daemon stopped: out of tea",
     ),
-    "silence": (_after_greeting(lambda n: None), "the daemon was silent for 1.5 s"),
+    "silence": (_after_greeting(lambda n: None), f"the daemon was silent for {IMPATIENT} s"),
     "half a message, then silence": (
         _after_greeting(lambda n: positions(1, n).encode()[:500]),
         "was silent for",
@@ -384,8 +397,8 @@ DAEMON_FAULTS_ELSEWHERE = (
     [("socket", fault) for fault in DAEMON_FAULTS]
     + [(transport, fault) for transport in ("tcp", "file") for fault in DAEMON_FAULTS_ELSEWHERE],
 )
-def test_pimplefoam_with_a_daemon_that_is(transport, fault, by_transport):
-    prepared = by_transport[transport]
+def test_pimplefoam_with_a_daemon_that_is(transport, fault, copy):
+    prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT)
     misbehave, expected = DAEMON_FAULTS[fault]
     if transport == "file" and fault == "truncated":
         expected = "message of the wrong length in"
@@ -394,42 +407,52 @@ def test_pimplefoam_with_a_daemon_that_is(transport, fault, by_transport):
     assert "daemon on" in line and f"its log: {prepared}/log.gbmDaemon" in line
 
 
-def test_pimplefoam_without_a_daemon(prepared):
+def test_pimplefoam_without_a_daemon(copy):
+    """It waits for one as long as it is told."""
+    prepared = copy(timeout=IMPATIENT)
     began = time.monotonic()
     solver = start_solver(prepared)
-    assert solver.wait(60) == 1
-    assert TIMEOUT < time.monotonic() - began < TIMEOUT + 5
+    assert solver.wait() == 1
+    assert time.monotonic() - began > IMPATIENT
     line = fatal_message(prepared / "log.pimpleFoam")
     assert "no daemon answers: No such file or directory; start it with 'gbm daemon" in line
     assert "log.gbmDaemon" in line
 
 
-def test_daemon_without_a_solver_waits_until_it_is_stopped(prepared):
+def test_daemon_without_a_solver_waits_until_it_is_stopped(copy):
     """No timeout: a solver that is started by hand may come late."""
+    prepared = copy(timeout=0.1)
     daemon = start_gbm("daemon", prepared)
     until((prepared / "gbm.sock").exists, "the socket")
     assert stat.S_IMODE((prepared / "gbm.sock").stat().st_mode) == 0o600
-    time.sleep(2 * TIMEOUT)
+    before = _wakes(daemon.pid)  # each to look whether it is to give up, after more than the timeout
+    until(lambda: daemon.poll() is not None or _wakes(daemon.pid) > before + 8, "its waking up")
     assert daemon.poll() is None
     daemon.terminate()
-    assert "stopped before OpenFOAM came" in one_line(daemon, "daemon", code=3)
+    assert "stopped before OpenFOAM came" in one_line(daemon, "daemon")
     assert not (prepared / "gbm.sock").exists()
+
+
+def _wakes(pid: int) -> int:
+    """How often a process has gone to sleep and was woken."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(re.search(r"^voluntary_ctxt_switches:\s+(\d+)", status, re.M)[1])
 
 
 # --- addresses ----------------------------------------------------------------------------------------------
 
 
-def test_stale_socket_is_replaced_and_one_in_use_is_not(patient):
+def test_stale_socket_is_replaced_and_one_in_use_is_not(prepared):
     with socket.socket(socket.AF_UNIX) as left_by_a_killed_daemon:
-        left_by_a_killed_daemon.bind(str(patient / "gbm.sock"))
-    with FakeSolver(patient) as solver:
+        left_by_a_killed_daemon.bind(str(prepared / "gbm.sock"))
+    with FakeSolver(prepared) as solver:
         solver.connect()
         solver.serve_until(1)
-        second = start_gbm("daemon", patient)
+        second = start_gbm("daemon", prepared)
         line = one_line(second, "daemon")
-        assert f"another daemon is under way in {patient} (process {solver.daemon.pid}" in line
-        line = one_line(start_gbm("run", patient), "run")  # which moves nothing away under a living daemon
-        assert "another daemon is under way" in line and (patient / "postProcessing/fibers/0").is_dir()
+        assert f"another daemon is under way in {prepared} (process {solver.daemon.pid}" in line
+        line = one_line(start_gbm("run", prepared), "run")  # which moves nothing away under a living daemon
+        assert "another daemon is under way" in line and (prepared / "postProcessing/fibers/0").is_dir()
         solver.raw(solver.sample(1).encode())
         solver.serve_until(3)  # unharmed
 
@@ -444,7 +467,7 @@ def test_address_that_is_a_folder(prepared):
 
 
 def test_case_that_cannot_be_written(prepared, tmp_path):
-    case = tmp_path / "case"
+    case = tmp_path / "read-only"
     case.mkdir()
     if os.geteuid() == 0:
         mount = ["mount", "--bind", "-o", "ro", prepared, case]
@@ -456,7 +479,7 @@ def test_case_that_cannot_be_written(prepared, tmp_path):
     try:
         for command in ("daemon", "run"):
             line = one_line(start_gbm(command, case), command)
-            assert f"cannot write in {case}: " in line
+            assert f"cannot write {case}/.gbm." in line
     finally:
         if os.geteuid() == 0:
             subprocess.run(["umount", case], check=True)
@@ -464,20 +487,20 @@ def test_case_that_cannot_be_written(prepared, tmp_path):
             case.chmod(0o700)
 
 
-def test_second_solver_is_told_so(patient):
-    with FakeSolver(patient) as solver:
+def test_second_solver_is_told_so(prepared):
+    with FakeSolver(prepared) as solver:
         solver.connect()
         solver.serve_until(4)
-        second = start_solver(patient)
-        assert second.wait(60) == 1
-        text = fatal_message(patient / "log.pimpleFoam")
+        second = start_solver(prepared)
+        assert second.wait() == 1
+        text = fatal_message(prepared / "log.pimpleFoam")
         assert "another solver is connected to this daemon: two runs in one case?" in text
         solver.raw(solver.sample(4).encode())
         solver.serve_until(6)  # unharmed
 
 
 def test_strangers_on_tcp_are_refused_and_the_run_goes_on(tmp_path):
-    case = make_case(tmp_path / "case", transport="tcp", timeout=30, tight=False)
+    case = make_case(tmp_path / "case", transport="tcp", tight=False)
     with FakeSolver(case) as solver:
         for token in ("", "0" * 32):
             solver.connect(token=token)
@@ -490,8 +513,8 @@ def test_strangers_on_tcp_are_refused_and_the_run_goes_on(tmp_path):
         with socket.create_connection((host, int(port))) as stranger:
             stranger.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n" + b"." * 40)
             assert b"not a message of a gbm plugin" in stranger.recv(4096)
-        assert start_solver(case).wait(60) == 0
-        output, _ = solver.daemon.communicate(timeout=20)
+        assert start_solver(case).wait() == 0
+        output, _ = solver.daemon.communicate()
         assert solver.daemon.returncode == 0
         assert output.count("refused 3 connections that were not the solver's") == 1
         assert "HTTP" not in output  # what strangers say is not the log's
@@ -499,7 +522,7 @@ def test_strangers_on_tcp_are_refused_and_the_run_goes_on(tmp_path):
 
 def test_stale_files_and_the_session_of_a_killed_daemon(tmp_path):
     """A solver that finds the session of a killed daemon is served by the next one, which clears the rest."""
-    case = make_case(tmp_path / "case", transport="file", timeout=30, tight=False)
+    case = make_case(tmp_path / "case", transport="file", tight=False)
     killed = start_gbm("daemon", case)
     session = until(
         lambda: (case / "exchange/session").exists() and (case / "exchange/session").read_text(), "it"
@@ -510,10 +533,11 @@ def test_stale_files_and_the_session_of_a_killed_daemon(tmp_path):
         (case / f"exchange/{session.strip()}.{name}").write_bytes(b"stale")
         (case / f"exchange/0123456789abcdef.{name}").write_bytes(b"stale")
     solver = start_solver(case)
-    time.sleep(1.0)  # it has said HELLO to nobody
+    hello = case / f"exchange/{session.strip()}.flow.0"
+    until(lambda: hello.read_bytes() != b"stale", "a HELLO to nobody")
     daemon = start_gbm("daemon", case)
-    assert solver.wait(60) == 0, (case / "log.pimpleFoam").read_text()[-2000:]
-    output, _ = daemon.communicate(timeout=20)
+    assert solver.wait() == 0, (case / "log.pimpleFoam").read_text()[-2000:]
+    output, _ = daemon.communicate()
     assert daemon.returncode == 0, output
     assert records(case) == 21
     assert not list((case / "exchange").iterdir())
@@ -543,19 +567,20 @@ def _continues(case, from_at_least: int) -> None:
 
 @pytest.mark.parametrize("victim", ["daemon", "solver"])
 @pytest.mark.parametrize("harm", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
-def test_of_a_run(victim, harm, long_case):
+def test_of_a_run(victim, harm, long_case, silence):
+    if harm is signal.SIGSTOP:
+        set_coupling(long_case, "socket", silence)
     run = Run(long_case)
     both = run.at_step(12)
-    began = time.monotonic()
     os.kill(both[victim], harm)
     line = run.line()
-    # a side that hangs is given time to end by itself
-    assert time.monotonic() - began < TIMEOUT + 20
     other = {"daemon": "pimpleFoam", "solver": "gbmDaemon"}[victim]
     if harm is signal.SIGKILL:
         assert {"daemon": "the daemon", "solver": "pimpleFoam"}[victim] + " was ended by SIGKILL" in line
     else:
-        assert {"daemon": "the daemon", "solver": "OpenFOAM"}[victim] + f" was silent for {TIMEOUT} s" in line
+        assert {"daemon": "the daemon", "solver": "OpenFOAM"}[
+            victim
+        ] + f" was silent for {silence:g} s" in line
         assert f"log.{other}" in line
     assert {"daemon": "log.gbmDaemon", "solver": "log.pimpleFoam"}[victim] in line
     assert not any(os.path.exists(f"/proc/{pid}") for pid in both.values())
@@ -563,8 +588,9 @@ def test_of_a_run(victim, harm, long_case):
     _continues(long_case, 12)
 
 
-def test_run_that_hangs_before_its_first_step(long_case):
+def test_run_that_hangs_before_its_first_step(long_case, silence):
     """Nobody waits for anybody with a timeout yet: `gbm run` itself ends it and says where it stood."""
+    set_coupling(long_case, "socket", silence)
     divide(long_case, 3, (1, 3, 1))
     run = Run(long_case, "--parallel")
     until(lambda: "solver" in children(run.process.pid), "the solver's start")
@@ -572,7 +598,7 @@ def test_run_that_hangs_before_its_first_step(long_case):
     victim = until(lambda: [pid for pid, _ in members(solver) if is_solver(pid)], "a rank")[-1]
     os.kill(victim, signal.SIGSTOP)
     line = run.line()
-    assert f"no step for {TIMEOUT + 5:g} s" in line
+    assert f"no step for {silence + 5:g} s" in line
     assert f"pimpleFoam was stopped by a signal (process {victim}; {long_case}/log.pimpleFoam)" in line
     assert "the daemon said last 'waiting for OpenFOAM (socket)'" in line
     assert not list(members(solver))
@@ -585,7 +611,7 @@ def test_run_stopped_on_request(number, long_case):
     run = Run(long_case)
     run.at_step(7)
     run.process.send_signal(number)
-    line = run.line(code=3)
+    line = run.line()
     assert "stopped on request; everything is written" in line
     last = records(long_case) - 1
     folder = long_case / f"{0.02 * last:g}"
@@ -597,7 +623,7 @@ def test_stopped_before_the_first_step(long_case):
     run = Run(long_case)
     until(lambda: "daemon" in children(run.process.pid), "the daemon's start")
     run.process.terminate()
-    assert "stopped" in run.line(code=3)
+    assert "stopped" in run.line()
 
 
 def test_two_runs_in_one_case(long_case):
@@ -657,7 +683,7 @@ def test_disk_full_while_the_state_of_the_fibers_is_written(long_case, small_dis
         line = one_line(solver.daemon, "daemon")
     assert f"No space left on device: '{long_case}/0.08/uniform/fibers.npz'" in line
     assert not list((long_case / "0.08/uniform").iterdir())
-    assert records(long_case) == 4
+    assert records(long_case) == 5  # a step is recorded before it is saved
 
 
 def test_disk_full_while_openfoam_writes(prepared, small_disk, tmp_path):

@@ -49,7 +49,7 @@ def box_case(
 
 def run(path: Path, ranks: int = 1) -> str:
     """Run the case's solver to its end; its log."""
-    status = start_solver(path, ranks).wait(120)
+    status = start_solver(path, ranks).wait()
     text = solver_log(path).read_text()
     assert status == 0, text[-2000:]
     return text

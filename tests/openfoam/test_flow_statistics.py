@@ -49,7 +49,7 @@ def prepare(path, schemes=FACE_SUMS, ranks: int = 1, **options):
 
 
 def solve(path, ranks: int = 1):
-    assert start_solver(path, ranks).wait(60) == 0, (path / "log.pimpleFoam").read_text()[-2000:]
+    assert start_solver(path, ranks).wait() == 0, (path / "log.pimpleFoam").read_text()[-2000:]
     if ranks > 1:
         utility(path, "reconstructPar", "-latestTime")
     return read_dat(path / "postProcessing/linearForcing", "linearForcing.dat")

@@ -93,7 +93,7 @@ def test_another_fluid_is_refused(tmp_path):
     (path / "constant/transportProperties").write_text(
         HEADER + "transportModel CrossPowerLaw; CrossPowerLawCoeffs { nu0 0.1; nuInf 0.01; m 1; n 1; }\n"
     )
-    assert start_solver(path).wait(60) != 0
+    assert start_solver(path).wait() != 0
     message = fatal_message(path / "log.pimpleFoam")
     assert "transportModel 'CrossPowerLaw'" in message and "constantViscosity" in message
     assert "transportProperties" in message

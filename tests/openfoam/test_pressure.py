@@ -111,7 +111,7 @@ def solve(path: Path, ranks: int = 1) -> str:
     """Run to the end; the log."""
     if ranks > 1:
         utility(path, "decomposePar")
-    assert start_solver(path, ranks).wait(timeout=60) == 0, fatal_message(path / "log.pimpleFoam")
+    assert start_solver(path, ranks).wait() == 0, fatal_message(path / "log.pimpleFoam")
     if ranks > 1:
         utility(path, "reconstructPar", "-latestTime")
     return (path / "log.pimpleFoam").read_text()
@@ -218,7 +218,7 @@ def test_two_ranks_equal_one(box, cells):
 
 
 def refusal(path: Path, ranks: int = 1) -> str:
-    assert start_solver(path, ranks).wait(timeout=60) != 0
+    assert start_solver(path, ranks).wait() != 0
     message = fatal_message(path / "log.pimpleFoam")
     assert message is not None, (path / "log.pimpleFoam").read_text()[-2000:]
     return message

@@ -57,7 +57,7 @@ def test_transforms_run_on_even_slabs_of_z_and_refuse_others(case, ranks, direct
     text = control.read_text()
     control.write_text(text[: text.index("functions")])
     divide(path, ranks, blocks(ranks, direction))
-    returned = start_solver(path, ranks).wait(timeout=60)
+    returned = start_solver(path, ranks).wait()
     message = fatal_message(path / "log.pimpleFoam")
     if direction == "z" and LAYERS % ranks == 0:
         assert returned == 0, message

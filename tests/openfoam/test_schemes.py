@@ -24,7 +24,7 @@ def prepare(path, convection: str, **options):
 
 
 def solve(path, ranks: int = 1) -> np.ndarray:
-    assert start_solver(path, ranks).wait(60) == 0, (path / "log.pimpleFoam").read_text()[-2000:]
+    assert start_solver(path, ranks).wait() == 0, (path / "log.pimpleFoam").read_text()[-2000:]
     if ranks > 1:
         utility(path, "reconstructPar", "-latestTime")
     return fluidfoam.readfield(str(path), TIME, "U", verbose=False)

@@ -201,29 +201,33 @@ def test_readable_after_every_interrupted_write(tmp_path, monkeypatch):
     assert set(outcomes) == {40, 41}
 
 
-def append_for_ever(path):
+def append_for_ever(path, done):
     recorder = Recorder(path, FAMILIES, **SCENE)
     for step in range(10**9):
         recorder.append(step, 0.1 * step, records(step))
+        done.value = step + 1
 
 
 def test_readable_after_sigkill(tmp_path):
+    """Within an append or between two: a moment after the child has come to some number of them."""
     random.seed(1)
+    fork = multiprocessing.get_context("fork")
     counts = []
     for kill in range(40):
-        path = tmp_path / str(kill) / "fibers.h5"
-        child = multiprocessing.get_context("fork").Process(target=append_for_ever, args=(path,))
+        path, done = tmp_path / str(kill) / "fibers.h5", fork.Value("q", 0)
+        child = fork.Process(target=append_for_ever, args=(path, done))
         child.start()
-        while not (path.exists() and path.stat().st_size):
+        while not (path.exists() and path.stat().st_size) or done.value < kill:
+            assert child.is_alive()
             time.sleep(1e-4)
-        time.sleep(random.uniform(0, 0.15))
+        time.sleep(random.uniform(0, 0.005))
         os.kill(child.pid, signal.SIGKILL)
         child.join()
         assert child.exitcode == -signal.SIGKILL
         with open_recording(path) as recording:
             counts.append(len(recording.steps))
             check_records(recording, range(counts[-1]))
-    assert max(counts) > 10  # the children were killed between and within appends, not before them
+        assert counts[-1] >= kill
 
 
 def test_read_while_it_is_written(tmp_path):

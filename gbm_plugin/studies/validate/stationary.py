@@ -175,8 +175,11 @@ def _extrapolated(coarse: tuple[int, dict], fine: tuple[int, dict]) -> dict[str,
     return found
 
 
-def solve(case: Path, folder: Path, engine: str, cells: int, time_step: float, turnovers: int) -> Path:
-    """One engine's run of the scene, in folder/<engine>_<cells>; returns the folder of its results."""
+def solve(
+    case: Path, folder: Path, engine: str, cells: int, time_step: float, turnovers: int, fibers: int = 80
+) -> Path:
+    """One engine's run of the scene, with so many fibers in each family, in folder/<engine>_<cells>; returns the
+    folder of its results."""
     record = round(TURNOVER / time_step / RECORDS)
     write = record * RECORDS
     count = SETTLING + turnovers
@@ -192,7 +195,7 @@ def solve(case: Path, folder: Path, engine: str, cells: int, time_step: float, t
         texts={
             "system/initialFieldDict": FLOW,
             "constant/fvOptions": FORCING,
-            "constant/fiberProperties": three_families(80, record, 1e-4, word),
+            "constant/fiberProperties": three_families(fibers, record, 1e-4, word),
         },
     )
     (run_openfoam if engine == "openfoam" else run_spectral)(copy)

@@ -15,9 +15,10 @@ LINEAR = {
 }
 
 
-@pytest.fixture
-def second_order(tmp_path):
-    """The default case with nothing but second-order schemes."""
+@pytest.fixture(scope="session")
+def second_order(tmp_path_factory):
+    """The default case with nothing but second-order schemes; studies copy it."""
+    tmp_path = tmp_path_factory.mktemp("second-order")
     for part in ("0.orig", "constant", "system"):
         shutil.copytree(DEFAULT_CASE / part, tmp_path / part, ignore=shutil.ignore_patterns("polyMesh"))
     for name, scheme in LINEAR.items():

@@ -16,11 +16,9 @@ POWER = 0.05
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
-    folder, turnovers = tmp_path_factory.mktemp("stationary"), 40
+    folder, turnovers = tmp_path_factory.mktemp("stationary"), 20
     jobs = [("openfoam", 12, 0.12), ("spectral", 16, 0.1)]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stationary, "FIBERS", stationary.FIBERS.replace("count 80", "count 2"))
-        results = {job: stationary.solve(DEFAULT_CASE, folder, *job, turnovers) for job in jobs}
+    results = {job: stationary.solve(DEFAULT_CASE, folder, *job, turnovers, fibers=2) for job in jobs}
     return stationary.compare(results, turnovers)
 
 

@@ -1,0 +1,27 @@
+"""The real daemon, late on purpose: `late_daemon.py CASE AHEAD LAST` holds the positions of each step back until the
+solver has solved AHEAD steps more than the samples are of, or all up to LAST."""
+
+import sys
+import time
+from pathlib import Path
+
+from gbm_plugin.coupling import daemon
+from gbm_plugin.fleet import fleet
+
+CASE = Path(sys.argv[1])
+AHEAD, LAST = map(int, sys.argv[2:])
+
+
+class LateFleet(fleet.Fleet):
+    step = 0
+
+    def advance(self, time_step: float) -> None:
+        super().advance(time_step)
+        steps = min(self.step + AHEAD, LAST)
+        while (CASE / "log.pimpleFoam").read_text().count("ExecutionTime") < steps:
+            time.sleep(0.001)
+        self.step += 1
+
+
+daemon.Fleet = LateFleet
+daemon.serve(CASE)
