@@ -31,7 +31,7 @@ class FileChannel(Channel):
         self._session = session
         self._sent = 0
         self._received = 0
-        self._data = b""
+        self._data = memoryview(b"")
 
     def incoming(self) -> Path:
         return self._folder / f"{self._session}.flow.{self._received}"
@@ -46,7 +46,7 @@ class FileChannel(Channel):
         self._sent += 1
 
     def receive(self, most: int = MAX_TEXT) -> Message:
-        self._data = self._next_file(HEADER_SIZE + max(most, MAX_TEXT))
+        self._data = memoryview(self._next_file(HEADER_SIZE + max(most, MAX_TEXT)))  # whose parts are no copies
         message = super().receive(most)
         if self._data:
             raise self.error(
@@ -72,7 +72,7 @@ class FileChannel(Channel):
         self._received += 1
         return data
 
-    def _read(self, size: int) -> bytes:
+    def _read(self, size: int) -> memoryview:
         data, self._data = self._data[:size], self._data[size:]
         if len(data) < size:
             raise self.error("short message")

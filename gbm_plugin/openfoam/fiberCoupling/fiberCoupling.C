@@ -314,13 +314,13 @@ void Foam::functionObjects::fiberCoupling::sendSample
     const label n = 3 + components(wanted_);
     stopwatch watch;
 
-    const scalarList sampled
+    scalarList sampled
     (
         sampler_->sample(U, wanted_, beads_())
     );
     t.sampling += watch.lap();
 
-    const scalarList values(beads_->collect(sampled, n));
+    const scalarList values(beads_->collect(std::move(sampled), n));
 
     label start = 0;
     for (fiberDaemon& daemon : daemons_)
@@ -355,7 +355,7 @@ void Foam::functionObjects::fiberCoupling::exchange()
         arrived = timeOfDay();
 
         stopwatch watch;
-        beads_->locate(positions);
+        beads_->locate(std::move(positions));
         t.location += watch.lap();
 
         // before the daemons write their state, which completes a time folder

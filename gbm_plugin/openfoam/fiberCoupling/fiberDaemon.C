@@ -106,8 +106,16 @@ std::uint32_t Foam::fiberDaemon::receivePositions
     UList<point> positions
 )
 {
-    const std::uint64_t size = std::uint64_t(beads_)*sizeof(point);
-    const message m(connection_->receive(message::POSITIONS, step, size));
+    const message m
+    (
+        connection_->receive
+        (
+            message::POSITIONS,
+            step,
+            std::uint64_t(beads_)*sizeof(point),
+            reinterpret_cast<char*>(positions.begin())
+        )
+    );
 
     if (mag(m.head.time - time) > tolerance)
     {
@@ -118,7 +126,6 @@ std::uint32_t Foam::fiberDaemon::receivePositions
         );
     }
 
-    std::memcpy(static_cast<void*>(positions.begin()), m.payload.data(), size);
     forAll(positions, i)
     {
         const point& p = positions[i];
@@ -160,33 +167,47 @@ void Foam::fiberDaemon::sendSample
     const UList<scalar>& values
 )
 {
-    // on the wire the velocities of all beads come first
-    const label extra = components(wanted_);
-    message m(message::SAMPLE, step, time);
-    scalar* velocity =
-        reinterpret_cast<scalar*>(m.extend(values.size()*sizeof(scalar)));
-    scalar* ambient = velocity + 3*beads_;
-    const scalar* value = values.cdata();
+    const label n = 3 + components(wanted_);
 
-    for (label bead = 0; bead < beads_; ++bead)
+    forAll(values, i)
     {
-        scalar sum = 0;
-        for (label i = 0; i < 3 + extra; ++i)
-        {
-            sum += mag(value[i]);
-        }
-        if (!std::isfinite(sum))
+        if (!std::isfinite(values[i]))
         {
             FatalErrorInFunction
-                << "the flow at bead " << bead << " is not finite at step "
+                << "the flow at bead " << i/n << " is not finite at step "
                 << step << ", time " << time << exit(FatalError);
         }
-        velocity = std::copy_n(value, 3, velocity);
-        ambient = std::copy_n(value + 3, extra, ambient);
-        value += 3 + extra;
     }
 
-    connection_->send(m);
+    message m(message::SAMPLE, step, time);
+    m.head.size = values.size()*sizeof(scalar);
+    connection_->begin(m);
+
+    // on the wire the velocities of all beads come first, then the rest of
+    // all; in parts, as one more list of all may not fit
+    const label beadsOfPart = 16384;
+    std::vector<scalar> part;
+    const auto add = [&](const label from, const label to)
+    {
+        for (label bead = 0; bead < beads_ && from < to; bead += beadsOfPart)
+        {
+            part.clear();
+            const label end = min(beads_, bead + beadsOfPart);
+            for (label b = bead; b < end; ++b)
+            {
+                const scalar* value = values.cdata() + n*b;
+                part.insert(part.end(), value + from, value + to);
+            }
+            connection_->add
+            (
+                reinterpret_cast<const char*>(part.data()),
+                part.size()*sizeof(scalar)
+            );
+        }
+    };
+    part.reserve(min(beads_, beadsOfPart)*max(label(3), n - 3));
+    add(0, 3);
+    add(3, n);
 }
 
 

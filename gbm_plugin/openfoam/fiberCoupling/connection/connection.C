@@ -74,7 +74,8 @@ Foam::connection::connection
     case_(caseFolder),
     share_(share),
     timeout_(coupling.lookupOrDefault<scalar>("timeout", 120)),
-    step_(-1)
+    step_(-1),
+    missing_(0)
 {
     if (timeout_ <= 0)
     {
@@ -126,8 +127,26 @@ void Foam::connection::fail(const string& what) const
 
 void Foam::connection::send(const message& m)
 {
+    begin(m);
+    if (m.head.size)
+    {
+        add(m.payload.data(), m.payload.size());
+    }
+}
+
+
+void Foam::connection::begin(const message& m)
+{
     step_ = m.head.step;
-    write(m);
+    missing_ = m.head.size;
+    put(reinterpret_cast<const char*>(&m.head), sizeof(m.head), !missing_);
+}
+
+
+void Foam::connection::add(const char* data, const std::size_t size)
+{
+    missing_ -= size;
+    put(data, size, !missing_);
 }
 
 
@@ -136,17 +155,32 @@ Foam::message Foam::connection::receive
     message::type expected,
     std::int64_t step,
     std::uint64_t least,
-    std::uint64_t most
+    std::uint64_t most,
+    char* payload
 )
 {
     message m;
-    read(m, most);
+    const auto next = [&]()
+    {
+        get(m.head);
+        const string problem(m.problem(most));
+        if (!problem.empty())
+        {
+            fail(problem);
+        }
+        if (m.head.type != expected || !payload)
+        {
+            m.payload.resize(m.head.size);
+            get(m.payload.data(), m.head.size);
+        }
+    };
+    next();
 
     // each a sign of life, after which the patience is as long again
     while (m.head.type == message::WAIT && expected == message::WELCOME)
     {
         Info<< "fiber coupling: " << m.line().c_str() << endl;
-        read(m, most);
+        next();
     }
 
     if (m.head.type == message::ERROR)
@@ -177,6 +211,25 @@ Foam::message Foam::connection::receive
           + " bytes, expected " + std::to_string(least)
         );
     }
+    if (payload)
+    {
+        get(payload, m.head.size);
+    }
 
     return m;
+}
+
+
+Foam::string Foam::connection::lastWord()
+{
+    message last;
+    get(last.head);
+    if (!last.problem(message::maxText).empty())
+    {
+        return string();
+    }
+    last.payload.resize(last.head.size);
+    get(last.payload.data(), last.head.size);
+
+    return last.head.type == message::ERROR ? last.line() : std::string();
 }

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
-#include <fstream>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -20,7 +19,8 @@ Foam::fileConnection::fileConnection
     connection(coupling, caseFolder, share),
     folder_(-1),
     sent_(0),
-    received_(0)
+    received_(0),
+    outgoing_(-1)
 {
     peer_ = case_/share.name("exchange");
 
@@ -44,6 +44,10 @@ Foam::fileConnection::fileConnection
 
 Foam::fileConnection::~fileConnection()
 {
+    if (outgoing_ >= 0)
+    {
+        ::close(outgoing_);
+    }
     if (folder_ >= 0)
     {
         ::close(folder_);
@@ -108,75 +112,90 @@ std::string Foam::fileConnection::messageName
 }
 
 
-void Foam::fileConnection::write(const message& m)
+void Foam::fileConnection::put
+(
+    const char* data,
+    std::size_t size,
+    const bool last
+)
 {
-    if (sent_ == 0)
-    {
-        first_ = m;
-    }
-    const std::string target(messageName("flow", sent_++));
+    const std::string target(messageName("flow", sent_));
     const std::string part(target + ".part");
 
-    const int fd = ::open
-    (
-        path(part).c_str(),
-        O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
-        0600
-    );
-    bool written = (fd >= 0);
-    const auto put = [&](const char* data, std::size_t size)
+    if (sent_ == 0)
     {
-        while (written && size)
-        {
-            const ssize_t n = ::write(fd, data, size);
-            written = (n > 0 || errno == EINTR);
-            data += max(n, ssize_t(0));
-            size -= max(n, ssize_t(0));
-        }
-    };
-    put(reinterpret_cast<const char*>(&m.head), sizeof(m.head));
-    put(m.payload.data(), m.payload.size());
+        first_.append(data, size);
+    }
+    if (outgoing_ < 0)
+    {
+        outgoing_ = ::open
+        (
+            path(part).c_str(),
+            O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
+            0600
+        );
+    }
 
-    if (!written || ::close(fd) != 0)
+    bool written = (outgoing_ >= 0);
+    while (written && size)
+    {
+        const ssize_t n = ::write(outgoing_, data, size);
+        written = (n > 0 || errno == EINTR);
+        data += max(n, ssize_t(0));
+        size -= max(n, ssize_t(0));
+    }
+    if (written && last)
+    {
+        written = (::close(outgoing_) == 0);
+        outgoing_ = -1;
+    }
+    if (!written)
     {
         fail("cannot write " + peer_ + "/" + part + ": " + std::strerror(errno));
     }
-    if (std::rename(path(part).c_str(), path(target).c_str()) != 0)
+    if (last && std::rename(path(part).c_str(), path(target).c_str()) != 0)
     {
-        fail("cannot rename " + peer_ + "/" + part + ": " + std::strerror(errno));
+        fail
+        (
+            "cannot rename " + peer_ + "/" + part + ": " + std::strerror(errno)
+        );
     }
+    sent_ += last;
 }
 
 
-void Foam::fileConnection::read(message& m, std::uint64_t most)
+void Foam::fileConnection::get(message::header& head)
 {
-    std::string source(messageName("fibers", received_++));
     const auto end = deadline();
     useconds_t pause = 50;
 
     // Sleeps that grow with the wait: short beside what was waited for
     // already, so late by 10 % at most and never busy
-    std::ifstream is;
     while (true)
     {
         // asked before the file is: a daemon's last word precedes its end
         const std::string now = session();
-        is.open(path(source), std::ios::binary);
-        if (is.is_open())
+        incoming_.open
+        (
+            path(messageName("fibers", received_)),
+            std::ios::binary
+        );
+        if (incoming_.is_open())
         {
             break;
         }
         if (now != session_)
         {
-            if (received_ > 1 || now.empty())
+            if (received_ > 0 || now.empty())
             {
                 fail("the daemon ended, or another one has taken its place");
             }
             // the file was one that a killed daemon had left
             session_ = now;
             sent_ = 0;
-            write(first_);
-            source = messageName("fibers", 0);
+            const std::string again(std::move(first_));
+            first_.clear();
+            put(again.data(), again.size(), true);
         }
         if (clock::now() > end)
         {
@@ -190,26 +209,31 @@ void Foam::fileConnection::read(message& m, std::uint64_t most)
         pause = min(useconds_t(1 + pause*11/10), useconds_t(20000));
     }
 
-    is.read(reinterpret_cast<char*>(&m.head), sizeof(m.head));
-    if (!is)
+    if (!incoming_.read(reinterpret_cast<char*>(&head), sizeof(head)))
     {
-        fail("short message in " + peer_ + "/" + source);
+        fail
+        (
+            "short message in " + peer_ + "/" + messageName("fibers", received_)
+        );
     }
-    const string problem(m.problem(most));
-    if (!problem.empty())
-    {
-        fail(problem);
-    }
+}
 
-    is.seekg(0, std::ios::end);
-    if (std::uint64_t(is.tellg()) != sizeof(m.head) + m.head.size)
+
+void Foam::fileConnection::get(char* payload, const std::size_t size)
+{
+    const std::string source(messageName("fibers", received_++));
+
+    // all of the file, and nothing behind it
+    if
+    (
+        !incoming_.read(payload, size)
+     || incoming_.peek() != std::ifstream::traits_type::eof()
+    )
     {
         fail("message of the wrong length in " + peer_ + "/" + source);
     }
-    is.seekg(sizeof(m.head));
-    m.payload.resize(m.head.size);
-    is.read(m.payload.data(), m.payload.size());
-    is.close();
+    incoming_.close();
+    incoming_.clear();
     std::remove(path(source).c_str());
 }
 

@@ -242,26 +242,31 @@ void Foam::socketConnection::wait(short events, clock::time_point end)
 }
 
 
-void Foam::socketConnection::writeAll(const char* data, std::size_t size)
+void Foam::socketConnection::put
+(
+    const char* data,
+    std::size_t size,
+    const bool last
+)
 {
+    // what belongs together in as few packets as possible
+    const int flags = MSG_NOSIGNAL | MSG_DONTWAIT | (last ? 0 : MSG_MORE);
     const auto end = deadline();
 
     while (size > 0)
     {
         wait(POLLOUT, end);
-        const ssize_t n =
-            ::send(socket_, data, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+        const ssize_t n = ::send(socket_, data, size, flags);
 
         if (n < 0 && errno != EAGAIN && errno != EINTR)
         {
             // what the daemon said before it closed names the cause
-            message last;
-            read(last, message::maxText);
-            if (last.head.type == message::ERROR)
-            {
-                fail("the daemon stopped: " + last.line());
-            }
-            fail(string("the daemon is gone: ") + std::strerror(errno));
+            const string gone
+            (
+                string("the daemon is gone: ") + std::strerror(errno)
+            );
+            const string cause(lastWord());
+            fail(cause.empty() ? gone : string("the daemon stopped: " + cause));
         }
         if (n > 0)
         {
@@ -272,13 +277,16 @@ void Foam::socketConnection::writeAll(const char* data, std::size_t size)
 }
 
 
-void Foam::socketConnection::readAll
-(
-    char* data,
-    std::size_t size,
-    clock::time_point end
-)
+void Foam::socketConnection::get(message::header& head)
 {
+    get(reinterpret_cast<char*>(&head), sizeof(head));
+}
+
+
+void Foam::socketConnection::get(char* data, std::size_t size)
+{
+    const auto end = deadline();
+
     while (size > 0)
     {
         wait(POLLIN, end);
@@ -298,28 +306,6 @@ void Foam::socketConnection::readAll
             size -= n;
         }
     }
-}
-
-
-void Foam::socketConnection::write(const message& m)
-{
-    writeAll(reinterpret_cast<const char*>(&m.head), sizeof(m.head));
-    writeAll(m.payload.data(), m.payload.size());
-}
-
-
-void Foam::socketConnection::read(message& m, std::uint64_t most)
-{
-    const auto end = deadline();
-
-    readAll(reinterpret_cast<char*>(&m.head), sizeof(m.head), end);
-    const string problem(m.problem(most));
-    if (!problem.empty())
-    {
-        fail(problem);
-    }
-    m.payload.resize(m.head.size);
-    readAll(m.payload.data(), m.payload.size(), end);
 }
 
 

@@ -42,17 +42,17 @@ void Foam::beadExchange::take
 
 // * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
 
-void Foam::beadExchange::locate(const UList<point>& positions)
+void Foam::beadExchange::locate(List<point>&& positions)
 {
-    brought_ = positions.size();
+    List<point> wrapped(std::move(positions));
+    brought_ = wrapped.size();
     numbers_.clear();
     points_.clear();
     cells_.clear();
 
-    List<point> wrapped(positions.size());
-    forAll(wrapped, i)
+    for (point& p : wrapped)
     {
-        wrapped[i] = box_.wrap(positions[i]);
+        p = box_.wrap(p);
     }
     const List<DynamicList<label>> candidates(places_.candidates(wrapped));
     const label me = Pstream::myProcNo();
@@ -112,10 +112,17 @@ Foam::label Foam::beadExchange::rankOf(const label i) const
 
 Foam::scalarList Foam::beadExchange::collect
 (
-    const UList<scalar>& sampled,
+    scalarList&& sampled,
     const label n
 ) const
 {
+    // in order already, and not a second list of all
+    const label me = Pstream::myProcNo();
+    if (!Pstream::parRun() && numbers_.size() == brought_)
+    {
+        return std::move(sampled);
+    }
+
     scalarList result(brought_*n);
     label found = 0;
 
@@ -136,7 +143,6 @@ Foam::scalarList Foam::beadExchange::collect
         );
     };
 
-    const label me = Pstream::myProcNo();
     put(numbersFor(me), sampled.cdata() + n*starts_[me]);
 
     if (Pstream::parRun())
