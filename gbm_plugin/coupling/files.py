@@ -46,7 +46,8 @@ class FileChannel(Channel):
         self._sent += 1
 
     def receive(self, most: int = MAX_TEXT) -> Message:
-        self._data = memoryview(self._next_file(HEADER_SIZE + max(most, MAX_TEXT)))  # whose parts are no copies
+        # of a view of the file parts are no copies
+        self._data = memoryview(self._next_file(HEADER_SIZE + max(most, MAX_TEXT)))
         message = super().receive(most)
         if self._data:
             raise self.error(
