@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 NEEDS = ("velocity", "rotation", "gradient")  # each costs more than the one before
 
@@ -50,10 +50,10 @@ def rotation_of(gradient: NDArray) -> NDArray:
     return 0.5 * np.stack(curl, axis=-1)
 
 
-def lagrange_weights(times: ArrayLike, time: float) -> NDArray:
+def lagrange_weights(times: Iterable[float], time: float) -> NDArray:
     """Weights of values at the given times in their interpolating polynomial at one time."""
-    times = [float(own) for own in times]
-    others = [times[:j] + times[j + 1 :] for j in range(len(times))]
+    nodes = [float(own) for own in times]
+    others = [nodes[:j] + nodes[j + 1 :] for j in range(len(nodes))]
     return np.array(
-        [math.prod((time - t) / (own - t) for t in rest) for own, rest in zip(times, others, strict=True)]
+        [math.prod((time - t) / (own - t) for t in rest) for own, rest in zip(nodes, others, strict=True)]
     )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from copy import copy
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from .bending import bending_energy
 from .contact import self_contacts
@@ -13,7 +15,7 @@ from .model import FiberOptions
 TOUCHING = 1e-6  # largest relative difference of a bead spacing from 2a
 
 
-def finite_array(name: str, value, shape_text: str, dimensions: int) -> np.ndarray:
+def finite_array(name: str, value: ArrayLike, shape_text: str, dimensions: int) -> np.ndarray:
     """value as a float64 array of so many dimensions, the last 3, and finite; else ValueError."""
     array = np.array(value, dtype=float)
     if array.ndim != dimensions or array.shape[-1] != 3:
@@ -43,12 +45,12 @@ class Fibers:
 
     def __init__(
         self,
-        positions,
-        bending_stiffness,
-        viscosity,
-        bending_torque="consistent",
-        curvature_law="sine",
-        young_modulus=None,
+        positions: ArrayLike,
+        bending_stiffness: ArrayLike | None,
+        viscosity: float,
+        bending_torque: str = "consistent",
+        curvature_law: str = "sine",
+        young_modulus: ArrayLike | None = None,
     ):
         beads = finite_array("positions", positions, "(fibers, beads, 3)", 3)
         if beads.shape[0] < 1 or beads.shape[1] < 2:
@@ -70,7 +72,7 @@ class Fibers:
         self.links = bonds / spacing[..., None]
         self.bending_stiffness = self._stiffness(bending_stiffness, young_modulus)
 
-    def _stiffness(self, bending_stiffness, young_modulus) -> np.ndarray:
+    def _stiffness(self, bending_stiffness: ArrayLike | None, young_modulus: ArrayLike | None) -> NDArray:
         if (bending_stiffness is None) == (young_modulus is None):
             raise ValueError("bending_stiffness and young_modulus: exactly one of them must be given")
         if bending_stiffness is None:
@@ -85,7 +87,15 @@ class Fibers:
 
     @classmethod
     def straight(
-        cls, count, beads, length, bending_stiffness, viscosity, box=None, seed=0, **options
+        cls,
+        count: int,
+        beads: int,
+        length: float,
+        bending_stiffness: ArrayLike | None,
+        viscosity: float,
+        box: ArrayLike | None = None,
+        seed: int = 0,
+        **options: Any,
     ) -> Fibers:
         """Straight fibers of contour length 2aN in random directions, all isotropic.
 
@@ -102,7 +112,7 @@ class Fibers:
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         sides = np.zeros(3) if box is None else np.broadcast_to(np.asarray(box, dtype=float), (3,))
         if not np.isfinite(sides).all() or (sides < 0).any():
-            raise ValueError(f"box is {box}; its sides must be finite and not negative")
+            raise ValueError(f"box is {sides}; its sides must be finite and not negative")
         centres = random.random((int(count), 3)) * sides
         offsets = diameter * (np.arange(beads) - (beads - 1) / 2)
         positions = centres[:, None] + offsets[:, None] * directions[:, None]

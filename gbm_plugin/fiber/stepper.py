@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..sampling import lagrange_weights
 from . import ab3, implicit
@@ -124,7 +125,7 @@ class Stepper:
         share = np.polyval(np.polyint(error), 1.0) / np.polyval(error, 1.0)
         return abs(share) * self._length * self.prediction_gap / self.fibers.contour_length
 
-    def observe(self, time, velocity, extra) -> None:
+    def observe(self, time: float, velocity: ArrayLike, extra: ArrayLike | None) -> None:
         """Take the flow at the current positions: velocity (F, N, 3); rotation (F, N, 3) or gradient.
 
         A second sample at the same time replaces the first. Raises ValueError for another time or shape,
@@ -141,7 +142,7 @@ class Stepper:
             velocity = velocity + push
         self._ambient.observe(time, velocity, extra)
 
-    def _field(self, name, values, tail) -> np.ndarray:
+    def _field(self, name: str, values: ArrayLike | None, tail: tuple[int, ...]) -> NDArray:
         """Sampled values, if they are (F, N, *tail) and finite."""
         array, shape = np.asarray(values, dtype=float), (self.fibers.count, self.fibers.beads, *tail)
         if array.shape != shape:
@@ -154,7 +155,7 @@ class Stepper:
             )
         return array
 
-    def advance(self, time_step) -> None:
+    def advance(self, time_step: float) -> None:
         """Advance by time_step, extrapolating the samples in time along each bead's path.
 
         Raises ValueError without a sample at the present time, FloatingPointError where a fiber becomes NaN.
@@ -301,7 +302,7 @@ class Stepper:
         self._counts["substeps"] += substeps
         self._counts["worst_error"] = max(self._counts["worst_error"], float(error.max(initial=0.0)))
 
-    def _finite(self, error: np.ndarray, members=None) -> None:
+    def _finite(self, error: NDArray, members: NDArray | None = None) -> None:
         """FloatingPointError naming the first fiber whose estimate is NaN."""
         wrong = np.flatnonzero(~np.isfinite(error))
         if len(wrong):
@@ -329,7 +330,7 @@ class Stepper:
         }
         return {**own, **self._ambient.state()}
 
-    def restore(self, state) -> None:
+    def restore(self, state: Mapping[str, NDArray]) -> None:
         """Take back what state() gave; ValueError if it is not of these fibers, or none at all."""
         check_state(state, self.fibers.count, self.fibers.beads)
         self.time = float(state["time"])

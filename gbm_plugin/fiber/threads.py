@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from typing import Any
 
 from numba import config
 
 BEADS_PER_THREAD = 2000  # fewer bead-steps are not worth a second thread,
 COPYING = 0.05  # and copying a bead is worth so much of a step
 
-_most = config.NUMBA_NUM_THREADS  # the cores of this process, or the environment variable of that name
+# the cores of this process, or the environment variable of that name
+_most: int = config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _pool: ThreadPoolExecutor | None = None
 _workers = 0  # of the pool
 
@@ -22,7 +25,7 @@ def available() -> int:
 
 
 @contextmanager
-def limited_to(threads: int):
+def limited_to(threads: int) -> Iterator[None]:
     """At most so many threads, inside a with."""
     global _most
     before, _most = _most, threads
@@ -32,7 +35,7 @@ def limited_to(threads: int):
         _most = before
 
 
-def in_shares(kernel, beads: float, *arguments, most: int | None = None) -> None:
+def in_shares(kernel: Callable[..., None], beads: float, *arguments: Any, most: int | None = None) -> None:
     """kernel(share, shares, *arguments) for every share, as many as so many bead-steps are worth, at most `most`.
 
     A kernel does the blocks share, share + shares, …: what it writes does not depend on their number.

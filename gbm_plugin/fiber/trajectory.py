@@ -55,18 +55,18 @@ def simulate(
     fibers: Sequence[Fibers], flow: Flow, time_step: float, end_time: float, *words: Any, **options: Any
 ) -> list[Trajectory]: ...
 def simulate(
-    fibers,
-    flow,
-    time_step,
-    end_time,
-    integrator="implicit",
-    mobility="freeDrain",
-    strain_coupling=False,
-    tolerance=None,
-    record_every=None,
-    repulsion=0.0,
-    start_time=0.0,
-):
+    fibers: Fibers | Sequence[Fibers],
+    flow: Flow,
+    time_step: float,
+    end_time: float,
+    integrator: str = "implicit",
+    mobility: str = "freeDrain",
+    strain_coupling: bool = False,
+    tolerance: float | None = None,
+    record_every: int | None = None,
+    repulsion: float = 0.0,
+    start_time: float = 0.0,
+) -> Trajectory | list[Trajectory]:
     """Trajectory of fibers carried by flow from start_time to end_time; a list of them for a list of families, which
     move together: the flow is sampled once for all.
 
@@ -257,7 +257,7 @@ class _AtOwnTimes(_Run):
     is known at its end."""
 
     def move(self, end: float) -> None:
-        interval = self.flow.sample_interval
+        interval: float = self.flow.sample_interval  # type: ignore[attr-defined]
         count = max(1, round((end - self.time) / interval))
         for n in range(count, 0, -1):
             self.step_by((end - self.time) / n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..sampling import NEEDS, one_of, rotation_of
 
@@ -10,7 +11,7 @@ from ..sampling import NEEDS, one_of, rotation_of
 class LinearFlow:
     """u(x) = velocity + gradient · x, steady; gradient[i, j] = du_i/dx_j, all finite, else ValueError."""
 
-    def __init__(self, gradient, velocity=(0, 0, 0)):
+    def __init__(self, gradient: ArrayLike, velocity: ArrayLike = (0, 0, 0)):
         self.gradient = np.array(gradient, dtype=float)
         self.velocity = np.array(velocity, dtype=float)
         if self.gradient.shape != (3, 3) or self.velocity.shape != (3,):
@@ -22,7 +23,9 @@ class LinearFlow:
             raise ValueError("gradient and velocity of a linear flow must be finite")
         self._rotation = rotation_of(self.gradient)
 
-    def sample(self, positions, time, need="gradient"):
+    def sample(
+        self, positions: ArrayLike, time: float, need: str = "gradient"
+    ) -> tuple[NDArray, NDArray | None]:
         """Velocity (..., 3) at positions (..., 3), and what need asks for beside it.
 
         need: "velocity" (extra is None), "rotation" (½∇×u, (..., 3)) or "gradient" ((..., 3, 3)).
@@ -42,12 +45,14 @@ class TaylorGreen:
     points is S = πU₀/width.
     """
 
-    def __init__(self, width, velocity):
+    def __init__(self, width: float, velocity: float):
         self.width, self.velocity = float(width), float(velocity)
         if not (np.isfinite(self.width) and self.width > 0 and np.isfinite(self.velocity)):
             raise ValueError(f"width is {width} and velocity {velocity}; width must be positive, both finite")
 
-    def sample(self, positions, time, need="gradient"):
+    def sample(
+        self, positions: ArrayLike, time: float, need: str = "gradient"
+    ) -> tuple[NDArray, NDArray | None]:
         """Velocity (..., 3) at positions (..., 3); extra as in LinearFlow.sample."""
         positions = np.asarray(positions, dtype=float)
         wavenumber = np.pi / self.width
@@ -80,7 +85,7 @@ class ABC:
     they are finite and box [m] is positive.
     """
 
-    def __init__(self, a=1.0, b=1.0, c=1.0, box=2 * np.pi):
+    def __init__(self, a: float = 1.0, b: float = 1.0, c: float = 1.0, box: float = 2 * np.pi):
         self.amplitudes = np.array([a, b, c], dtype=float)
         self.box = float(box)
         if not (np.isfinite(self.amplitudes).all() and np.isfinite(self.box) and self.box > 0):
@@ -88,7 +93,9 @@ class ABC:
                 f"a, b, c are {a}, {b}, {c} and box {box}; box must be positive, all of them finite"
             )
 
-    def sample(self, positions, time, need="gradient"):
+    def sample(
+        self, positions: ArrayLike, time: float, need: str = "gradient"
+    ) -> tuple[NDArray, NDArray | None]:
         """Velocity (..., 3) at positions (..., 3); extra as in LinearFlow.sample."""
         positions = np.asarray(positions, dtype=float)
         a, b, c = self.amplitudes

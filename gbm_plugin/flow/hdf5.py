@@ -13,6 +13,7 @@ time and velocity are datasets; box, origin and location are attributes of the f
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -63,7 +64,7 @@ def _opened(path: Path) -> h5py.File:
         raise ValueError(f"it cannot be read as HDF5: {error}") from None
 
 
-def _value(file: h5py.File, name: str):
+def _value(file: h5py.File, name: str) -> Any:
     """An attribute, or else a dataset; None where there is neither."""
     if name in file.attrs:
         return file.attrs[name]

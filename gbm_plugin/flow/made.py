@@ -16,8 +16,18 @@ Function = Callable[[NDArray, float], ArrayLike]
 
 
 class _FunctionFlow:
-    def __init__(self, velocity: Function, rotation: Function | None, gradient: Function | None, difference):
-        self._given = {"velocity": velocity, "rotation": rotation, "gradient": gradient}
+    def __init__(
+        self,
+        velocity: Function,
+        rotation: Function | None,
+        gradient: Function | None,
+        difference: float | None,
+    ):
+        self._given: dict[str, Function | None] = {
+            "velocity": velocity,
+            "rotation": rotation,
+            "gradient": gradient,
+        }
         self._difference = difference
 
     def sample(
@@ -35,7 +45,9 @@ class _FunctionFlow:
         return velocity, rotation_of(gradient) if need == "rotation" else gradient
 
     def _call(self, what: str, positions: NDArray, time: float) -> NDArray:
-        values = np.asarray(self._given[what](positions, time), dtype=float)
+        function = self._given[what]
+        assert function is not None
+        values = np.asarray(function(positions, time), dtype=float)
         shape = (*positions.shape, 3) if what == "gradient" else positions.shape
         if values.shape != shape:
             raise ValueError(

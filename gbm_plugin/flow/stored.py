@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,11 +96,10 @@ class StoredFlow:
             raise ValueError(f"the flow is not known at {positions[~within][0]}")
         points = self._in_cells(positions.reshape(-1, 3))
         parts = (grid.on_grid(self.interpolation, field, points) for field in fields)
-        velocity = sum(w * part for w, part in zip(weights, parts, strict=True)).reshape(positions.shape)
+        velocity = _weighted(weights, parts).reshape(positions.shape)
         if need == "velocity":
             return velocity, None
-        parts = (self._derivative(n, need, points) for n in numbers)
-        extra = sum(w * part for w, part in zip(weights, parts, strict=True))
+        extra = _weighted(weights, (self._derivative(n, need, points) for n in numbers))
         tail = (3, 3) if need == "gradient" else (3,)
         return velocity, extra.reshape(*positions.shape[:-1], *tail)
 
@@ -115,6 +114,7 @@ class StoredFlow:
         """Of the fields, the first of which is read if none was."""
         if self._shape is None:
             self._field(0, "velocity")
+        assert self._shape is not None
         return self._shape
 
     def _in_cells(self, points: NDArray) -> NDArray:
@@ -180,6 +180,12 @@ class StoredFlow:
                 f"the velocity stored at time {time:.9g} is not finite: component {component} in cell {tuple(cell)}"
             )
         return velocity
+
+
+def _weighted(weights: Iterable[float], parts: Iterable[NDArray]) -> NDArray:
+    """Weighted sum."""
+    first, *rest = (w * part for w, part in zip(weights, parts, strict=True))
+    return sum(rest, start=first)
 
 
 def refuse_gaps(times: NDArray, begin: float, end: float) -> None:
