@@ -52,7 +52,7 @@ def test_a_pipe_that_nobody_reads(case):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     process.stdout.close()
     errors = process.stderr.read()
-    assert process.wait(120) == 0 and "Error" not in errors, errors
+    assert process.wait() == 0 and "Error" not in errors, errors
     assert latest(case) == 0.4
 
 
