@@ -31,7 +31,7 @@ def _prepare_grid() -> None:
     field, points, spacing = np.zeros((3, 4, 4, 4)), np.zeros((1, 3)), np.ones(3)
     for word in grid.WORDS:
         grid.on_grid(word, field, points)
-    grid.cubic_gradient(field, points, spacing)
+    grid.lagrange_gradient("cubic", field, points, spacing)
     grid.rotation(field, spacing)
     grid.gradient(field, spacing)
 

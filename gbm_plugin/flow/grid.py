@@ -5,8 +5,10 @@ from numpy.typing import NDArray
 
 from ..compiled import kernel, only_read, part
 
-WORDS = ("trilinear", "cubic")
-LEAST_BOUNDED = 4  # values in each direction of a field that is not periodic
+LAGRANGE = {"cubic": 4, "quintic": 6}  # nodes in each direction
+WORDS = ("trilinear", *LAGRANGE)
+BOUNDED = ("trilinear", "cubic")  # those for a field that is not periodic
+LEAST_BOUNDED = 4  # values in each direction of such a field
 
 
 @kernel
@@ -29,34 +31,38 @@ def trilinear(fields, points, out):
 
 
 @part
-def _cubic_row(x, count, weights, nodes):
-    """The four of `count` periodic nodes around x, and Lagrange's weights of them; returns the place in between."""
+def _nearest(x, count, weights, slopes, nodes):
+    """The nearest of `count` periodic nodes around x, and Lagrange's weights of their values and slopes."""
+    width = weights.shape[0]
     i = int(np.floor(x))
-    s = x - i
-    weights[0] = -s * (s - 1) * (s - 2) / 6
-    weights[1] = (s + 1) * (s - 1) * (s - 2) / 2
-    weights[2] = -(s + 1) * s * (s - 2) / 2
-    weights[3] = (s + 1) * s * (s - 1) / 6
-    for q in range(4):
-        nodes[q] = (i - 1 + q) % count
-    return s
+    below = width // 2 - 1
+    s = x - i + below
+    for q in range(width):
+        weight, slope = 1.0, 0.0
+        for r in range(width):
+            if r != q:
+                slope = (slope * (s - r) + weight) / (q - r)
+                weight = weight * (s - r) / (q - r)
+        weights[q], slopes[q] = weight, slope
+        nodes[q] = (i - below + q) % count
 
 
 @kernel
-def cubic(fields, points, out):
-    """As `trilinear`, with Lagrange cubics through the four nearest nodes in each direction. Error O(h^4)."""
-    weights = np.empty((3, 4))
-    nodes = np.empty((3, 4), np.intp)
+def lagrange(fields, points, width, out):
+    """As `trilinear`, with Lagrange polynomials through the `width` nearest nodes in each direction: error
+    O(h^width)."""
+    weights, slopes = np.empty((3, width)), np.empty((3, width))
+    nodes = np.empty((3, width), np.intp)
     for p in range(points.shape[0]):
         for d in range(3):
-            _cubic_row(points[p, d], fields.shape[1 + d], weights[d], nodes[d])
+            _nearest(points[p, d], fields.shape[1 + d], weights[d], slopes[d], nodes[d])
         for m in range(fields.shape[0]):
             total = 0.0
-            for i in range(4):
-                for j in range(4):
+            for i in range(width):
+                for j in range(width):
                     row = fields[m, nodes[0, i], nodes[1, j]]
                     line = 0.0
-                    for k in range(4):
+                    for k in range(width):
                         line += weights[2, k] * row[nodes[2, k]]
                     total += weights[0, i] * weights[1, j] * line
             out[p, m] = total
@@ -66,29 +72,28 @@ def on_grid(word: str, fields: NDArray, points: NDArray) -> NDArray:
     """Interpolate fields (m, nx, ny, nz), nodes at 0, 1, 2, ..., at points (P, 3) in units of cells, which
     need not lie inside the box: (P, m)."""
     out = np.empty((len(points), len(fields)))
-    {"trilinear": trilinear, "cubic": cubic}[word](only_read(fields), only_read(points), out)
+    if word == "trilinear":
+        trilinear(only_read(fields), only_read(points), out)
+    else:
+        lagrange(only_read(fields), only_read(points), LAGRANGE[word], out)
     return out
 
 
 @kernel
-def _cubic_slopes(fields, points, out):
-    """out (P, m, 3): derivatives of the interpolant of `cubic` in units of cells."""
-    weights, slopes = np.empty((3, 4)), np.empty((3, 4))
-    nodes = np.empty((3, 4), np.intp)
+def _lagrange_slopes(fields, points, width, out):
+    """out (P, m, 3): derivatives of the interpolant of `lagrange` in units of cells."""
+    weights, slopes = np.empty((3, width)), np.empty((3, width))
+    nodes = np.empty((3, width), np.intp)
     for p in range(points.shape[0]):
         for d in range(3):
-            s = _cubic_row(points[p, d], fields.shape[1 + d], weights[d], nodes[d])
-            slopes[d, 0] = -(3 * s * s - 6 * s + 2) / 6
-            slopes[d, 1] = (3 * s * s - 4 * s - 1) / 2
-            slopes[d, 2] = -(3 * s * s - 2 * s - 2) / 2
-            slopes[d, 3] = (3 * s * s - 1) / 6
+            _nearest(points[p, d], fields.shape[1 + d], weights[d], slopes[d], nodes[d])
         for m in range(fields.shape[0]):
             dx = dy = dz = 0.0
-            for i in range(4):
-                for j in range(4):
+            for i in range(width):
+                for j in range(width):
                     row = fields[m, nodes[0, i], nodes[1, j]]
                     line = slope = 0.0
-                    for k in range(4):
+                    for k in range(width):
                         value = row[nodes[2, k]]
                         line += weights[2, k] * value
                         slope += slopes[2, k] * value
@@ -98,11 +103,11 @@ def _cubic_slopes(fields, points, out):
             out[p, m, 0], out[p, m, 1], out[p, m, 2] = dx, dy, dz
 
 
-def cubic_gradient(velocity: NDArray, points: NDArray, spacing: NDArray) -> NDArray:
-    """du_i/dx_j (P, 3, 3) of the `cubic` interpolant of a velocity (3, nx, ny, nz), points as in `on_grid`. Error
-    O(h^3)."""
+def lagrange_gradient(word: str, velocity: NDArray, points: NDArray, spacing: NDArray) -> NDArray:
+    """du_i/dx_j (P, 3, 3) of the interpolant of a velocity (3, nx, ny, nz), points as in `on_grid`, by a word of
+    `LAGRANGE`. One order below that of the velocity."""
     out = np.empty((len(points), 3, 3))
-    _cubic_slopes(only_read(velocity), only_read(points), out)
+    _lagrange_slopes(only_read(velocity), only_read(points), LAGRANGE[word], out)
     return out / spacing
 
 

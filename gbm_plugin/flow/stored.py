@@ -30,8 +30,8 @@ class StoredFlow:
     (offset 0), or over all cells (offset ½). There `inside` says of positions whether they are in it.
     in_time: "cubic" (through four fields, from one side near the ends; through all where there are fewer) or
     "linear". At a stored time the field itself is taken. interpolation in space: "trilinear", with derivatives
-    by central differences at the nodes, interpolated alike; or "cubic", with the interpolant's own derivatives;
-    both as the coupling to OpenFOAM has them. ValueError for an unknown word or bad numbers.
+    by central differences at the nodes, interpolated alike; or "cubic" or, of a periodic field, "quintic", with the interpolant's own
+    derivatives; all as the coupling to OpenFOAM has them. ValueError for an unknown word or bad numbers.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class StoredFlow:
         self.times = np.array(times, dtype=float)
         self.box, self.origin = (np.array(v, dtype=float) for v in (box, origin))
         self.offset = float(offset)
-        self.interpolation = one_of("interpolation", interpolation, grid.WORDS)
+        self.interpolation = one_of("interpolation", interpolation, grid.WORDS if periodic else grid.BOUNDED)
         self.in_time = one_of("interpolation in time", in_time, POINTS_IN_TIME)
         self.periodic = bool(periodic)
         self.inside = None if periodic else self._inside
@@ -130,7 +130,9 @@ class StoredFlow:
         """Rotation (P, 3) or gradient (P, 9 or 3, 3) of one stored field at points in units of cells."""
         if self.interpolation == "trilinear":
             return grid.on_grid("trilinear", self._field(number, need), points)
-        g = grid.cubic_gradient(self._field(number, "velocity"), points, self.box / self._cells)
+        g = grid.lagrange_gradient(
+            self.interpolation, self._field(number, "velocity"), points, self.box / self._cells
+        )
         return g if need == "gradient" else rotation_of(g)
 
     def _stencil(self, time: float) -> tuple[list[int], list[float]]:

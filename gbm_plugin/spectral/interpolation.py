@@ -1,4 +1,4 @@
-"""Values of a periodic field between its nodes x_i = i box/n: trilinear, cubic, or the Fourier sum."""
+"""Values of a periodic field between its nodes x_i = i box/n: trilinear, cubic, quintic, or the Fourier sum."""
 
 import finufft
 import numpy as np

@@ -24,7 +24,7 @@ class SpectralSolver:
     Either time_step (fixed) or cfl is given; with cfl the step is cfl h/max(|u_x| + |u_y| + |u_z|), h =
     box/n, chosen anew in every step (AB3 is stable below 0.34, RK4 below 1.35).
     scheme: "ab3" (third order, the paper's) or "rk4"; precision: "double" or "single"; threads: of the CPU;
-    interpolation: "trilinear" (the paper's), "cubic" or "exact", for `sample`; device: "cpu" or "gpu" (needs
+    interpolation: "trilinear" (the paper's), "cubic", "quintic" or "exact", for `sample`; device: "cpu" or "gpu" (needs
     CuPy).
 
     The fluid starts at rest at time 0. Raises ValueError for a bad value, FloatingPointError when the

@@ -24,12 +24,14 @@ def rms(error):
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5])
-@pytest.mark.parametrize("word, order", [("trilinear", (2, 2, 2)), ("cubic", (4, 3, 3))])
+@pytest.mark.parametrize(
+    "word, order", [("trilinear", (2, 2, 2)), ("cubic", (4, 3, 3)), ("quintic", (6, 5, 5))]
+)
 def test_order_in_space(word, order, offset):
     """Velocity, rotation and gradient, at a stored time. The slope of a cubic is of third order."""
     velocity, rotation, gradient = exact(POINTS, 0.4)
     errors = []
-    for factor in (2, 4):
+    for factor in (3, 6):
         flow = stored([0.0, 0.4], factor * CELLS, offset, interpolation=word)
         u, spin = flow.sample(POINTS, 0.4, "rotation")
         v, slope = flow.sample(POINTS, 0.4, "gradient")
@@ -154,7 +156,7 @@ def nothing(_):
         (([0.0, 1.0], nothing, (1, 1)), "must be \\(3,\\)"),
         (
             ([0.0, 1.0], nothing, BOX, ORIGIN, 0.5, "cellPoint"),
-            "'cellPoint'; allowed are trilinear, cubic",
+            "'cellPoint'; allowed are trilinear, cubic, quintic",
         ),
         (
             ([0.0, 1.0], nothing, BOX, ORIGIN, 0.5, "cubic", "spline"),

@@ -126,7 +126,10 @@ def test_a_gpu_that_is_not_there_is_named(tmp_path):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (("constant/fiberProperties", "interpolation", "cellPoint"), "allowed: trilinear cubic exact"),
+        (
+            ("constant/fiberProperties", "interpolation", "cellPoint"),
+            "allowed: trilinear cubic quintic exact",
+        ),
         (("system/blockMeshDict", "n", "15"), "same even number"),
     ],
 )

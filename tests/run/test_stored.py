@@ -235,7 +235,10 @@ def test_bad_folders_are_refused(case):
     where = "component 0 in cell (0, 0, 0)"
     refused(case, f"the velocity stored at time 0.12 is not finite: {where}", FloatingPointError)
     set_entry(case / "constant/fiberProperties", "interpolation", "cellPoint")
-    refused(case, "interpolation 'cellPoint' is not one of those for stored fields; allowed: trilinear cubic")
+    refused(
+        case,
+        "interpolation 'cellPoint' is not one of those for stored fields; allowed: trilinear cubic quintic",
+    )
     set_entry(case / "constant/fiberProperties", "interpolation", "cubic")
     set_entry(case / "system/blockMeshDict", "n", "20")
     refused(case, "has (16, 16, 16) cells, system/blockMeshDict says (20, 20, 20)")

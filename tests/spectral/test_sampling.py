@@ -50,7 +50,7 @@ def test_exact_is_the_fourier_sum(points):
     assert np.abs(extra - gradient).max() < 1e-12 * np.abs(gradient).max()
 
 
-@pytest.mark.parametrize("word, order", [("trilinear", 2), ("cubic", 4)])
+@pytest.mark.parametrize("word, order", [("trilinear", 2), ("cubic", 4), ("quintic", 6)])
 def test_order_of_interpolation(word, order, points):
     velocity, gradient = direct_sum(smooth(16, word), points)
     errors = []

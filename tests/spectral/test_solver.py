@@ -264,7 +264,10 @@ def test_blow_up_is_an_error_at_its_step():
         ({"scheme": "euler"}, "scheme is 'euler'; allowed are ab3, rk4"),
         ({"precision": "half"}, "precision"),
         ({"threads": 0}, "threads"),
-        ({"interpolation": "linear"}, "interpolation is 'linear'; allowed are trilinear, cubic, exact"),
+        (
+            {"interpolation": "linear"},
+            "interpolation is 'linear'; allowed are trilinear, cubic, quintic, exact",
+        ),
         ({"device": "tpu"}, "device is 'tpu'; allowed are cpu, gpu"),
     ],
 )

@@ -71,37 +71,49 @@ void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
     extent_ = last - first_ + Vector<label>::one;
     slots_.setSize(extent_.x()*extent_.y()*extent_.z(), -1);
 
-    // local cells by number, then every slot around them
     Map<label> local(2*nCells);
+    List<char> near(slots_.size(), char(0));
     for (label celli = 0; celli < nCells; ++celli)
     {
-        local.insert(box_.number(box_.place(celli)), celli);
+        const Vector<label> i(box_.place(celli));
+        local.insert(box_.number(i), celli);
+        slots_[slot(i)] = celli;
+        near[slot(i)] = 1;
+    }
+
+    // widened by some layers in one direction after the other
+    for (direction d = 0; d < vector::nComponents; ++d)
+    {
+        const List<char> inside(near);
+        forAll(inside, s)
+        {
+            for (label m = -layers; inside[s] && m <= layers; ++m)
+            {
+                near[s + m*strides()[d]] = 1;
+            }
+        }
     }
 
     DynamicList<label> slots;
     DynamicList<label> numbers;
 
-    for (label celli = 0; celli < nCells; ++celli)
+    forAll(near, s)
     {
-        const Vector<label> c(box_.place(celli));
-
-        for (label k = -layers; k <= layers; ++k)
-        for (label j = -layers; j <= layers; ++j)
-        for (label i = -layers; i <= layers; ++i)
+        if (near[s] && slots_[s] == -1)
         {
-            const Vector<label> neighbour(c + Vector<label>(i, j, k));
-            label& s = slots_[slot(neighbour)];
+            const Vector<label> i
+            (
+                s % extent_.x(),
+                (s/extent_.x()) % extent_.y(),
+                s/(extent_.x()*extent_.y())
+            );
+            const label number = box_.number(first_ + i);
+            slots_[s] = local.lookup(number, -1);
 
-            if (s == -1)
+            if (slots_[s] == -1)
             {
-                s = local.lookup(box_.number(neighbour), -1);
-
-                if (s == -1)
-                {
-                    s = -2;     // asked for
-                    slots.append(slot(neighbour));
-                    numbers.append(box_.number(neighbour));
-                }
+                slots.append(s);
+                numbers.append(number);
             }
         }
     }

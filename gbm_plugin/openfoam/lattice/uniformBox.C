@@ -86,7 +86,7 @@ Foam::label Foam::uniformBox::number(const Vector<label>& place) const
 
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        i[d] = (place[d] + n_[d]) % n_[d];
+        i[d] = (place[d] % n_[d] + n_[d]) % n_[d];
     }
 
     return i.x() + n_.x()*(i.y() + n_.y()*i.z());

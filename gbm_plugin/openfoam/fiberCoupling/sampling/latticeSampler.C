@@ -1,38 +1,36 @@
 #include "latticeSampler.H"
 #include "interpolants.H"
 
-template<class Interpolant>
-Foam::scalarList Foam::latticeSampler<Interpolant>::sample
-(
-    const volVectorField& U,
-    const ambient wanted,
-    const beadExchange& beads
-) const
+namespace
 {
-    const vectorField& cells = U.primitiveField();
-    const List<vector> neighbours(lattice_.gather(cells));
-    const vector& perCell = lattice_.box().perCell();
 
-    stencil u
-    {
-        nullptr, lattice_.strides(), cells.cdata(), neighbours.cdata(),
-        cells.size()
-    };
+using namespace Foam;
 
-    scalarList values(beads.points().size()*(3 + components(wanted)));
-    scalar* out = values.begin();
+//- What 'sample' of sampler gives, for all points
+template<class Interpolant>
+INLINE void sampleAll
+(
+    const Interpolant& interpolant,
+    const lattice& cells,
+    const UList<point>& points,
+    const ambient wanted,
+    stencil u,
+    scalar* out
+)
+{
+    const vector perCell(cells.box().perCell());
 
-    for (const point& p : beads.points())
+    for (const point& p : points)
     {
         vector x;
-        u.slot = lattice_.around(p, x);
+        u.slot = cells.around(p, x);
 
         vector d[3];
         const vector velocity
         (
             wanted == NOTHING
-          ? Interpolant::value(u, x)
-          : Interpolant::gradient(u, x, d)
+          ? interpolant.value(u, x)
+          : interpolant.gradient(u, x, d)
         );
 
         out = std::copy_n(velocity.cdata(), 3, out);
@@ -55,6 +53,67 @@ Foam::scalarList Foam::latticeSampler<Interpolant>::sample
             }
         }
     }
+}
+
+
+VECTORISED
+void sampleWith
+(
+    const trilinear& interpolant, const lattice& cells,
+    const UList<point>& points, ambient wanted, const stencil& u, scalar* out
+)
+{
+    sampleAll(interpolant, cells, points, wanted, u, out);
+}
+
+
+VECTORISED
+void sampleWith
+(
+    const cubic& interpolant, const lattice& cells,
+    const UList<point>& points, ambient wanted, const stencil& u, scalar* out
+)
+{
+    sampleAll(interpolant, cells, points, wanted, u, out);
+}
+
+
+VECTORISED
+void sampleWith
+(
+    const quintic& interpolant, const lattice& cells,
+    const UList<point>& points, ambient wanted, const stencil& u, scalar* out
+)
+{
+    sampleAll(interpolant, cells, points, wanted, u, out);
+}
+
+}
+
+
+template<class Interpolant>
+Foam::scalarList Foam::latticeSampler<Interpolant>::sample
+(
+    const volVectorField& U,
+    const ambient wanted,
+    const beadExchange& beads
+) const
+{
+    static const Interpolant interpolant = Interpolant();
+
+    const vectorField& cells = U.primitiveField();
+    const List<vector> neighbours(lattice_.gather(cells));
+    const stencil u
+    {
+        nullptr, lattice_.strides(), cells.cdata(), neighbours.cdata(),
+        cells.size()
+    };
+
+    scalarList values(beads.points().size()*(3 + components(wanted)));
+    sampleWith
+    (
+        interpolant, lattice_, beads.points(), wanted, u, values.begin()
+    );
 
     return values;
 }
@@ -62,3 +121,4 @@ Foam::scalarList Foam::latticeSampler<Interpolant>::sample
 
 template class Foam::latticeSampler<Foam::trilinear>;
 template class Foam::latticeSampler<Foam::cubic>;
+template class Foam::latticeSampler<Foam::quintic>;

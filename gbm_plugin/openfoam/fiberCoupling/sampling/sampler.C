@@ -14,7 +14,7 @@ Foam::autoPtr<Foam::sampler> Foam::sampler::New
     const word scheme =
         fiberProperties.lookupOrDefault<word>("interpolation", "trilinear");
 
-    if (scheme == "trilinear" || scheme == "cubic")
+    if (scheme == "trilinear" || scheme == "cubic" || scheme == "quintic")
     {
         const string& problem = uniformBox::New(mesh).problem();
         if (!problem.empty())
@@ -29,6 +29,10 @@ Foam::autoPtr<Foam::sampler> Foam::sampler::New
         {
             return autoPtr<sampler>(new latticeSampler<cubic>(mesh));
         }
+        if (scheme == "quintic")
+        {
+            return autoPtr<sampler>(new latticeSampler<quintic>(mesh));
+        }
         return autoPtr<sampler>(new latticeSampler<trilinear>(mesh));
     }
 
@@ -36,7 +40,7 @@ Foam::autoPtr<Foam::sampler> Foam::sampler::New
     {
         FatalIOErrorInFunction(fiberProperties)
             << "interpolation '" << scheme << "' is unknown to OpenFOAM;"
-            << " allowed: trilinear cubic "
+            << " allowed: trilinear cubic quintic "
             << flatOutput
                (
                    interpolation<vector>::dictionaryConstructorTablePtr_
