@@ -17,6 +17,7 @@ NEWEST, OLDER = (
     6,
 )  # numbers for each cell that OpenFOAM writes: U, p, phi; U_0, phi_0 of schemes that remember
 REMEMBER = ("backward", "CrankNicolson", "localEuler")
+MODES = 9  # numbers for each cell in uniform/boxFoam, in binary: of the velocity and of two earlier rates
 BINARY, SIGNS = 8, 6  # bytes of a number in binary; sign, point, exponent and a space beside its digits
 STATE, CLOUD, RECORD = 290, 110, 24  # bytes for each bead: fibers.npz, the cloud beside the fields, a record
 TABLES = 600  # bytes of a step in all tables of postProcessing
@@ -47,14 +48,15 @@ def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
 
 def _cell_bytes(scene: Scene, control: Dictionary) -> float:
     numbers = NEWEST
-    if (scene.case / "system/fvSchemes").is_file():
+    own = scene.application == "boxFoam"
+    if not own and (scene.case / "system/fvSchemes").is_file():
         schemes = Dictionary.read(scene.case, "system/fvSchemes")
         ddt = str(schemes.sub("ddtSchemes", {}).raw("default", ""))
         numbers += OLDER if any(name in ddt for name in REMEMBER) else 0
     ascii = control.word("writeFormat", default="ascii") == "ascii"
     size = control.integer("writePrecision", 6) + SIGNS if ascii else BINARY
     packed = control.word("writeCompression", default="off") in ("on", "yes", "true", "compressed")
-    return numbers * size * (0.5 if packed else 1.0)
+    return numbers * size * (0.5 if packed else 1.0) + (MODES * BINARY if own else 0)
 
 
 class Room:

@@ -7,6 +7,7 @@ import shutil
 from dataclasses import asdict
 
 from ..scales import kolmogorov_length
+from . import solver
 from .disk import needed, readable
 from .scene import Family, Scene
 
@@ -19,6 +20,7 @@ def figures(scene: Scene) -> dict:
     does not fix it (it is the input power of constantPower)."""
     dissipation = scene.forcing.values.get("power") if scene.forcing else None
     flow = {
+        "solver": solver.meaning(scene),
         "viscosity": scene.kinematic_viscosity,
         "density": scene.density,
         "box": scene.box,

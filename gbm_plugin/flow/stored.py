@@ -30,8 +30,9 @@ class StoredFlow:
     (offset 0), or over all cells (offset ½). There `inside` says of positions whether they are in it.
     in_time: "cubic" (through four fields, from one side near the ends; through all where there are fewer) or
     "linear". At a stored time the field itself is taken. interpolation in space: "trilinear", with derivatives
-    by central differences at the nodes, interpolated alike; or "cubic" or, of a periodic field, "quintic", with the interpolant's own
-    derivatives; all as the coupling to OpenFOAM has them. ValueError for an unknown word or bad numbers.
+    by central differences at the nodes, interpolated alike; or "cubic" or, of a periodic field, "quintic", with the
+    interpolant's own derivatives; all as the coupling to OpenFOAM has them. ValueError for an unknown word or bad
+    numbers.
     """
 
     def __init__(

@@ -1,0 +1,52 @@
+"""What gbm says of the solver that a case names."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from gbm_plugin.case.disk import needed
+from gbm_plugin.case.scene import read_scene
+from gbm_plugin.case.solver import DIFFERENCES, meaning
+from gbm_plugin.errors import CaseError
+
+from conftest import make_case, set_entry
+
+
+@pytest.fixture
+def path(tmp_path):
+    return make_case(tmp_path / "case", cells=32, time_step=0.02, prepared=False, application="boxFoam")
+
+
+FIRST = {"central2": (1 / 2,), "central4": (2 / 3, -1 / 12), "central6": (3 / 4, -3 / 20, 1 / 60)}
+
+
+@pytest.mark.parametrize("word, first", FIRST.items())
+def test_the_limit_of_stability(path, word, first):
+    """Of AB3 on the imaginary axis, 0.7236, over the largest eigenvalue of the difference."""
+    theta = np.linspace(0, np.pi, 2001)
+    largest = sum(2 * a * np.sin(m * theta) for m, a in enumerate(first, start=1)).max()
+    assert DIFFERENCES[word][1] == pytest.approx(0.7236 / largest, abs=0.006)
+    with (path / "system/fvSchemes").open("a") as file:
+        file.write(f"\nboxSchemes {{ differences {word}; }}\n")
+    text = meaning(read_scene(path))
+    assert f"boxFoam, {DIFFERENCES[word][0]} order in space" in text
+    fastest = float(re.search(r"below (\S+) m/s", text).group(1))
+    assert fastest == pytest.approx(DIFFERENCES[word][1] * (2 * np.pi / 32) / 0.02, rel=5e-3)
+
+
+def test_a_word_that_it_does_not_have(path):
+    with (path / "system/fvSchemes").open("a") as file:
+        file.write("\nboxSchemes { differences central8; }\n")
+    with pytest.raises(CaseError, match=r"central8.*central2 central4 central6"):
+        meaning(read_scene(path))
+
+
+def test_it_writes_its_modes(path):
+    """Seven numbers of U, p and phi for each cell, and nine of modes in place of pimpleFoam's older fields."""
+    cells = 32**3
+    own = needed(read_scene(path))["time_folder"]
+    set_entry(path / "system/controlDict", "application", "pimpleFoam")
+    assert own - needed(read_scene(path))["time_folder"] == pytest.approx((9 - 6) * 8 * cells)
