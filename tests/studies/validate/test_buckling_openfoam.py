@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from gbm_plugin.studies.validate import buckling_openfoam
 
+from conftest import DEFAULT_CASE
 
-def test_paths_converge_to_those_of_simulate(second_order):
-    result = buckling_openfoam.run(second_order, cells=[16, 24], steps=64, halvings=2, count=24, end=1.0)
+
+def test_paths_converge_to_those_of_simulate():
+    result = buckling_openfoam.run(DEFAULT_CASE, cells=[12, 16], steps=32, halvings=1, count=24, end=1.0)
     text = buckling_openfoam.table(result)
     (orders,) = result["orders"]
-    assert 1.6 < orders["paths_error"] < 2.6, text
-    assert result["rows"][1]["paths_error"] < 0.05, text
-    assert 2 < result["temporal_orders"][0]["paths_error"] < 4, text  # the coupling's quadratic extrapolation
+    # cubic interpolation of fluxes and samples: the flow loses by their sixth order, paths follow it
+    assert orders["velocity_error"] > 3 and orders["paths_error"] > 3, text
+    assert result["rows"][1]["paths_error"] < 0.1, text
+    assert result["temporal_rows"][0]["paths_error"] < 0.2 * result["rows"][0]["paths_error"], (
+        text
+    )  # of the same mesh
     held, analytic, apart = result["probability_rows"]
     assert held["tracks"] > 10 and analytic["tracks"] > 10, text
-    assert abs(apart["probability"]) < 4 * max(apart["standard_error"], 0.02), text
+    assert abs(apart["probability"]) <= 4 * max(apart["standard_error"], 0.02), text
