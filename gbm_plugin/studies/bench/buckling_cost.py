@@ -2,8 +2,8 @@
 
 All methods move the same fibers for so short a time that most paths stay together; a difference in P is then that of
 the method, with the error of paired fibers, and not of chance. The reference is ab3 at an eighth of the default step.
-Methods on the front have no other that is both faster and nearer to the reference by more than the resolution, one
-event among all tracks. Processor time.
+Methods on the front have no other that is both faster and nearer to the reference, |ΔP| and its error taken together.
+Processor time.
 """
 
 from __future__ import annotations
@@ -71,10 +71,11 @@ def run(
 
 
 def _on_front(row: dict, found: list[dict]) -> bool:
-    """Whether nothing of the same fibers is faster and nearer to the reference by more than an event."""
+    """Whether nothing of the same fibers is both faster and certainly as near to the reference: |ΔP| and its error
+    together are what a method is sure of."""
     same = [r for r in found if (r["sperm_number"], r["beads"]) == (row["sperm_number"], row["beads"])]
-    event = 1 / row["tracks"] if row["tracks"] else 0.0
-    better = (r for r in same if r["seconds"] < row["seconds"] and r["error"] + event < row["error"])
+    sure = row["error"] + row["error_of_error"]
+    better = (r for r in same if r["seconds"] < row["seconds"] and r["error"] + r["error_of_error"] < sure)
     return not row["reference"] and next(better, None) is None
 
 
