@@ -34,5 +34,5 @@ def test_committed_curve_is_consistent():
 
 
 def test_missing_files_are_named(tmp_path):
-    with pytest.raises(OSError, match="curve.csv"):
+    with pytest.raises(OSError, match=r"curve\.csv"):
         buckling_claims.run(tmp_path)
