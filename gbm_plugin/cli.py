@@ -1,4 +1,5 @@
-"""The command line, `gbm`. Exit codes: 0 done, 1 a failure that is named in one line, 2 wrong usage."""
+"""The command line, `gbm`. Exit codes: 0 done, 1 a failure that is named in one line, 2 wrong usage, 3 stopped on
+request, with all that is needed to continue written."""
 
 from __future__ import annotations
 
@@ -6,43 +7,63 @@ import argparse
 import csv
 import json
 import logging
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from . import __version__
-from .errors import GbmError
+from .errors import GbmError, Stopped, one_line
+from .signals import ASKS
 
 # what is said in one line: the rest is a fault of the program, with its traceback
-EXPECTED = (GbmError, ValueError, OSError, FloatingPointError)
+EXPECTED = (GbmError, ValueError, OSError, FloatingPointError, MemoryError)
+DONE, FAILED, USAGE, STOPPED = 0, 1, 2, 3
 COMMON = {"action", "command", "study", "csv", "figure", "json"}  # not of a study itself
 
 
 def main(argv: list[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     arguments = _parser(words).parse_args(words)
-    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[_Screen(sys.stdout)])
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
     try:
         result = arguments.action(arguments)
         if result is not None and getattr(arguments, "json", None):
             Path(arguments.json).write_text(json.dumps(result, indent=2) + "\n")
-    except MemoryError as error:
-        return _failed(arguments.command, f"not enough memory: {error}")
+        sys.stdout.flush()
+    except BrokenPipeError:  # who read what is printed has gone, as head does
+        _to_nowhere(sys.stdout)
+        return DONE
     except KeyboardInterrupt:
-        return _failed(arguments.command, "stopped on request")
+        return _failed(arguments.command, "stopped on request", STOPPED)
+    except Stopped as error:
+        return _failed(arguments.command, one_line(error), STOPPED)
     except Exception as error:
         if not isinstance(error, EXPECTED):
             raise
-        return _failed(arguments.command, str(error))
-    return 0
+        return _failed(arguments.command, one_line(error))
+    return DONE
 
 
-def _failed(command: str, problem: str) -> int:
-    """One line, whatever the problem's text is."""
-    print(f"gbm {command}: {' '.join(problem.split())}", file=sys.stderr)
-    return 1
+def _failed(command: str, problem: str, code: int = FAILED) -> int:
+    print(f"gbm {command}: {problem}", file=sys.stderr)
+    return code
+
+
+class _Screen(logging.StreamHandler):
+    """What is said goes nowhere once nobody reads it: a run does not end for that."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        if isinstance(sys.exc_info()[1], BrokenPipeError):
+            _to_nowhere(self.stream)
+        else:
+            super().handleError(record)
+
+
+def _to_nowhere(stream) -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
@@ -133,7 +154,9 @@ def _new(arguments) -> None:
 def _run(arguments) -> None:
     from .run import openfoam as run
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, until the run has its own way
+    for number in ASKS:  # as Ctrl-C, until the run has its own way
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
     if arguments.parallel and arguments.flow != "openfoam":
         raise ValueError("--parallel is for OpenFOAM; the spectral solver takes --threads")
     for option in ("fields", "in_time"):
@@ -163,17 +186,25 @@ def _report(arguments) -> dict:
     print("\n".join(summary(arguments.case)))
     folder = Path(arguments.case) / "report"
     print(f"written to {folder}: {' '.join(result['files'])}")
+    for change in result["changes"]:
+        print(f"changed at t = {change['time']:g} (dotted in the figures): {', '.join(change['changes'])}")
     for reason in result["not_drawn"]:
         print(f"not drawn: {reason}")
     return result
 
 
 def _info(arguments) -> dict:
+    from .case.check import notes
     from .case.info import describe, figures
+    from .case.mesh import difference
     from .case.scene import read_scene
 
-    result = figures(read_scene(arguments.case))
+    scene = read_scene(arguments.case)
+    result = figures(scene)
     print(describe(result))
+    result["notes"] = [*notes(scene), *filter(None, [difference(scene.case)])]
+    for note in result["notes"]:
+        print(f"note: {note}")
     return result
 
 

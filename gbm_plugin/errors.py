@@ -40,3 +40,13 @@ class CouplingError(GbmError):
 
 class RunError(GbmError):
     """A run that did not reach its end: names the cause, the side that failed and its log."""
+
+
+class Stopped(RunError):
+    """A run that ended before its end because a signal asked for it; what it needs to continue is written."""
+
+
+def one_line(error: BaseException) -> str:
+    """What an error says, as its user reads it."""
+    text = f"not enough memory: {error}" if isinstance(error, MemoryError) else str(error)
+    return " ".join(text.split()) or type(error).__name__

@@ -38,6 +38,16 @@ def daemon_table(share: Share = WHOLE) -> str:
     return share.name("daemon", ".dat")
 
 
+def warnings_file(share: Share = WHOLE) -> str:
+    """The file of what a daemon warns of."""
+    return share.name("warnings", ".txt")
+
+
+def cause_file(case: Path, share: Share = WHOLE) -> Path:
+    """Where a daemon that failed leaves why, in one line."""
+    return case / share.name(".gbm.daemon", ".cause")
+
+
 def log_file(case: Path, program: str) -> Path:
     """What a program says when it works on the case."""
     return case / f"log.{program}"

@@ -51,6 +51,9 @@ def environment() -> dict[str, str]:
     env["PATH"] = os.pathsep.join(filter(None, [str(programs), env.get("PATH", "")]))
     if os.geteuid() == 0:
         env |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    # more ranks than cores: in words that other MPIs pass over, as they would not an option (Open MPI 4, and 5)
+    env.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
+    env.setdefault("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe")
     return env
 
 
@@ -85,7 +88,9 @@ def command(program: str, case: Path, ranks: int = 1) -> list[str]:
         raise InstallationError(f"the OpenFOAM program '{program}' is not on the PATH")
     argv = [program, "-case", str(case)]
     if ranks > 1:
-        argv = ["mpirun", "-np", str(ranks), "--oversubscribe", *argv, "-parallel"]
+        # a queue asks all processes of a job to end: the ranks are told by the daemon; mpirun resets what it was given
+        deaf = ["sh", "-c", 'trap "" HUP TERM USR1 USR2; exec "$@"', "sh"]
+        argv = ["mpirun", "-np", str(ranks), *deaf, *argv, "-parallel"]
     return argv
 
 
@@ -109,6 +114,13 @@ def utility(case: Path, program: str, *options: str) -> None:
 def fatal_message(log: Path) -> str | None:
     """The text of the first FOAM FATAL ERROR of a log, in one line; None where there is none."""
     return fatal_text(log.read_text(errors="replace")) if log.is_file() else None
+
+
+def last_words(log: Path, lines: int = 3) -> str:
+    """The last lines of a log that say anything, in one."""
+    text = log.read_text(errors="replace") if log.is_file() else ""
+    said = [line.strip() for line in text.splitlines() if line.strip(" -=*\t")]
+    return " ".join(said[-lines:])
 
 
 def fatal_text(text: str) -> str | None:

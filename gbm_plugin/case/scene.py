@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -126,9 +127,9 @@ def read_scene(case: Path | str) -> Scene:
     case = Path(case)
     if not case.is_dir():
         raise CaseError(f"there is no case folder {case}")
-    if " " in str(case.resolve()):
+    if bad := re.search(r"[\s\"']", str(case.resolve())):
         raise CaseError(
-            f"the path of the case, '{case.resolve()}', has a space, which OpenFOAM does not take"
+            f"the path of the case, {case.resolve()}, has the character {bad[0]!r}, which OpenFOAM does not take"
         )
     control = Dictionary.read(case, "system/controlDict")
     if "adjustTimeStep" in control and control.switch("adjustTimeStep"):
@@ -157,13 +158,36 @@ def read_scene(case: Path | str) -> Scene:
         texts=_texts(case),
     )
     fibers.done()
+    _check_memory(scene)
     for family in scene.families:
+        if family.model.repulsion * time_step > 1:
+            raise CaseError(
+                f"{fibers.where}: repulsion is {family.model.repulsion:g} in family {family.name}: with deltaT "
+                f"{time_step:g} at most 1/deltaT = {1 / time_step:g} is stable"
+            )
         if family.count < scene.coupling.daemons:
             raise CaseError(
                 f"{case}/constant/fiberProperties: {scene.coupling.daemons} daemons cannot share the {family.count} "
                 f"fibers of family {family.name}: each needs at least one"
             )
     return scene
+
+
+BYTES = 300  # at least, that a bead takes: states before and after a step, rates, multipliers, three samples
+
+
+def _check_memory(scene: Scene) -> None:
+    need = BYTES * sum(f.count * f.beads for f in scene.families) / scene.coupling.daemons
+    there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if need > there:
+        raise CaseError(
+            f"{scene.case}/constant/fiberProperties: not enough memory: {_beads(scene)} beads take {need / 1e9:.0f} GB "
+            f"or more in each daemon, and this machine has {there / 1e9:.0f} GB"
+        )
+
+
+def _beads(scene: Scene) -> str:
+    return f"{sum(f.count * f.beads for f in scene.families):.3g}"
 
 
 def _read_application(control: Dictionary) -> str:
@@ -324,6 +348,7 @@ def _texts(case: Path) -> dict[str, str]:
     names = (
         "constant/fiberProperties",
         "constant/transportProperties",
+        "constant/turbulenceProperties",
         "constant/fvOptions",
         "system/controlDict",
         "system/fvSchemes",

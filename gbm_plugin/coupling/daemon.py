@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import signal
 import threading
 import time as clock
 from collections.abc import Iterator
@@ -17,14 +16,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..case.layout import fiber_state, find_state, log_file, results, states
+from ..case.layout import cause_file, fiber_state, find_state, log_file, results, states
 from ..case.lock import DAEMON, locked
 from ..case.scene import Scene, read_scene
 from ..case.share import Share
 from ..case.trust import check_case
-from ..errors import CaseError, CouplingError, StateError
+from ..errors import CaseError, CouplingError, StateError, Stopped, one_line
+from ..files import write_text
 from ..fleet.fleet import Fleet, prepare_kernels
 from ..fleet.journal import Journal
+from ..signals import Asked, handled
 from .channel import Channel
 from .listen import listen
 from .message import (
@@ -58,15 +59,17 @@ def serve(case: Path | str, number: int | None = None) -> None:
     check_case(case)
     share = _share(scene, number)
     scene = scene.part(share)
-    stop = _StopFlag()
+    stop = Asked()
     solver_log = log_file(case, scene.application)
     with (
+        handled(lambda number: _note(stop, number)),
         locked(case, share.name(DAEMON)),
+        _leaving_its_cause(cause_file(case, share)),
         listen(case, scene.coupling, solver_log, share) as listener,
     ):
         log.info("waiting for OpenFOAM (%s)", scene.coupling.transport)
         if (greeted := listener.greet(give_up=lambda: bool(stop))) is None:
-            raise CouplingError("stopped before OpenFOAM came")
+            raise Stopped("stopped before OpenFOAM came")
         channel, *first = greeted
         try:
             Session(scene, share, channel, stop).run(*first)
@@ -90,22 +93,25 @@ def _share(scene: Scene, number: int | None) -> Share:
     return Share(number or 1, daemons)
 
 
-class _StopFlag:
-    """True once SIGINT or SIGTERM came: the run then ends after its next step, with everything written. A
-    second signal ends it at once."""
+@contextlib.contextmanager
+def _leaving_its_cause(path: Path) -> Iterator[None]:
+    """Of a daemon that fails, in a file for whoever started it."""
+    path.unlink(missing_ok=True)
+    try:
+        yield
+    except Stopped:
+        raise
+    except Exception as error:
+        with contextlib.suppress(OSError):  # a full disk may be the cause
+            write_text(path, one_line(error) + "\n")
+        raise
 
-    def __init__(self) -> None:
-        self._set = False
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._note)
 
-    def _note(self, *_) -> None:
-        if self._set:
-            raise CouplingError("stopped by a second signal; what is recorded is kept")
-        self._set = True
-
-    def __bool__(self) -> bool:
-        return self._set
+def _note(stop: Asked, number: int) -> None:
+    """The run then ends after its next step, with everything written; the same signal once more ends it at once."""
+    stop.note(number)
+    if stop.again:
+        raise CouplingError("stopped by a second signal; what is recorded is kept")
 
 
 @contextlib.contextmanager
@@ -131,7 +137,7 @@ def _patience(channel: Channel, first: Message) -> Iterator[None]:
 class Session:
     """One run of the solver, from HELLO to GOODBYE."""
 
-    def __init__(self, scene: Scene, share: Share, channel: Channel, stop: _StopFlag):
+    def __init__(self, scene: Scene, share: Share, channel: Channel, stop: Asked):
         self.scene = scene
         self.share = share
         self.channel = channel

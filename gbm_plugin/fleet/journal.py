@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
 from .. import __version__
-from ..case.layout import daemon_table, recording_name
+from ..case.layout import daemon_table, recording_name, warnings_file
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share
 from ..files import created
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
-from .fleet import Fleet
+from .fleet import GAP_WARNING, Fleet
+
+log = logging.getLogger(__name__)
 
 
 class Journal:
@@ -28,6 +32,10 @@ class Journal:
         """folder: of this start, where both files are made anew. origin, box (3,): of the flow's box [m]."""
         self.scene, self.fleet = scene, fleet
         self._recorded = False
+        self._folder, self._share = folder, share
+        self._warnings: IO | None = None
+        self._steps, self._badly_predicted = 0, 0
+        self._warned, self._worst = 0.0, 0.0
         self.recorder = Recorder(
             keep_earlier(folder / recording_name(share)),
             [_family_record(f) for f in scene.families],
@@ -59,12 +67,35 @@ class Journal:
         if provisional:
             fleet.correct()
             return False
-        gap = fleet.check_prediction(velocity, step)
+        gap, wrong = fleet.check_prediction(velocity, step)
+        self._note_prediction(step, wrong)
         self._add_row(step, sent_at, arrived_at, gap)
         if not self._recorded or step % self.scene.record_interval == 0:
             self.recorder.append(step, fleet.time, fleet.by_family)
             self._recorded = True
         return True
+
+    def _note_prediction(self, step: int, wrong: float) -> None:
+        """A warning the first time, and whenever it has doubled; the count comes at the end."""
+        self._steps += 1
+        if not wrong:
+            return
+        self._badly_predicted += 1
+        if wrong > 2 * self._warned:
+            self._warned = wrong
+            self.warn(
+                f"step {step}: the flow at the fibers was predicted with an error of {100 * wrong:.0f} % of its rms: "
+                "a shorter deltaT would be wise"
+            )
+        self._worst = max(self._worst, wrong)
+
+    def warn(self, text: str) -> None:
+        """Into the log, and into the file in which `gbm run` sees it."""
+        log.warning("%s", text)
+        with contextlib.suppress(OSError):  # a full disk is named by what must not be lost
+            if self._warnings is None:
+                self._warnings = created(keep_earlier(self._folder / warnings_file(self._share)), buffering=1)
+            self._warnings.write(text + "\n")
 
     def _add_row(self, step: int, sent_at: float, arrived_at: float, gap: float) -> None:
         row = [f"{self.fleet.time:.12g}", str(step), f"{sent_at:.6f}", f"{arrived_at:.6f}", f"{gap:.6g}"]
@@ -75,7 +106,15 @@ class Journal:
             raise OSError(error.errno, error.strerror, str(self._path)) from None
 
     def close(self) -> None:
+        if self._badly_predicted > 1:
+            self.warn(
+                f"in {self._badly_predicted} of {self._steps} steps the flow at the fibers was predicted with an error "
+                f"of more than {100 * GAP_WARNING:.0f} % of its rms, up to {100 * self._worst:.0f} %: a shorter deltaT "
+                "would be wise"
+            )
         self.recorder.close()
+        if self._warnings is not None:
+            self._warnings.close()
         with contextlib.suppress(OSError):  # a full disk was named when a row did not fit
             self._table.close()
 

@@ -158,6 +158,12 @@ class StoredFlow:
             return [near], [1.0]
         return list(window), lagrange_weights(times[list(window)], time).tolist()
 
+    def kolmogorov_time(self, time: float) -> float:
+        """(nu/epsilon)^(1/2) = <|omega|^2>^(-1/2) of isotropic turbulence, at the stored time nearest to this one."""
+        rotation = self._field(int(np.argmin(np.abs(self.times - time))), "rotation")
+        square = 4 * float((rotation**2).sum(axis=0).mean())
+        return square**-0.5 if square > 0 else np.inf
+
     def _field(self, number: int, name: str) -> NDArray:
         """velocity, rotation or gradient at one of the stored times, components first."""
         kept = self._fields.setdefault(number, {})
@@ -191,12 +197,15 @@ def _weighted(weights: Iterable[float], parts: Iterable[NDArray]) -> NDArray:
     return sum(rest, start=first)
 
 
-def refuse_gaps(times: NDArray, begin: float, end: float) -> None:
+def refuse_gaps(times: NDArray, begin: float, end: float, written_every: float = 0.0) -> None:
     """ValueError where a field between begin and end seems to be missing: an interval between two times that is
     longer than those beside it and than most. Times that are written more or less often from some time on are none.
+
+    written_every: the interval at which they were to be written [s], if it is known: what a run that was stopped
+    wrote in between makes none of its intervals a gap.
     """
     intervals = np.diff(times)
-    usual = np.median(intervals)
+    usual = max(float(np.median(intervals)), written_every)
     for n, interval in enumerate(intervals):
         if times[n + 1] < begin + SAME_TIME * interval or times[n] > end - SAME_TIME * interval:
             continue

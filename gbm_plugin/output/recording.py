@@ -80,7 +80,8 @@ class Recording:
     """One run's fibers, read from one file or from the parts that its restarts wrote.
 
     times (S,) [s]; steps (S,); families by name; box_origin, box_size (3,) [m]; metadata: schema_version,
-    program, program_version, dynamic_viscosity [Pa s], density [kg/m³], dictionaries (text by file name).
+    program, program_version, dynamic_viscosity [Pa s], density [kg/m³], dictionaries (text by file name), of the last
+    part; starts: first time and dictionaries of each part.
     Usable as a context manager; positions are read from the open files.
     """
 
@@ -94,6 +95,9 @@ class Recording:
         self.box_origin = last.files[0].box_origin
         self.box_size = last.files[0].box_size
         self.metadata = last.files[0].metadata
+        self.starts = [
+            (part.times[0], part.files[0].metadata["dictionaries"]) for part in parts if len(part.times)
+        ]
         self.families = {
             name: RecordedFamily(
                 **vars(record),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,8 +18,9 @@ _DISSIPATION = {
 _KOLMOGOROV = 1.6  # constant of E = C ε^(2/3) k^(-5/3), Sreenivasan 1995
 
 
-def energy_figure(table: Mapping[str, NDArray]) -> Figure:
-    """Kinetic energy and dissipation against time from the columns of the forcing's table that are there."""
+def energy_figure(table: Mapping[str, NDArray], changed: Sequence[float] = ()) -> Figure:
+    """Kinetic energy and dissipation against time from the columns of the forcing's table that are there; changed:
+    times at which the case was."""
     figure = new_figure(6.4, 5.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
     if "k" in table:
@@ -32,9 +33,17 @@ def energy_figure(table: Mapping[str, NDArray]) -> Figure:
     if drawn:
         lower.legend(ncols=len(drawn), loc="lower center", bbox_to_anchor=(0.5, 1.0))
     lower.margins(x=0.01)
+    _mark(changed, upper, lower)
     lower.set(xlabel="t [s]", ylabel="ε [m²/s³]", ylim=(0, None))
     figure.align_ylabels()
     return figure
+
+
+def _mark(times: Sequence[float], *axes) -> None:
+    """Where the case was changed between two parts of the run."""
+    for time in times:
+        for panel in axes:
+            panel.axvline(time, color="0.45", linewidth=1, linestyle=":", zorder=0)
 
 
 def spectrum_figure(
@@ -59,10 +68,13 @@ def spectrum_figure(
     return figure
 
 
-def end_to_end_figure(times: NDArray, families: Mapping[str, tuple[NDArray, NDArray, int]]) -> Figure:
+def end_to_end_figure(
+    times: NDArray, families: Mapping[str, tuple[NDArray, NDArray, int]], changed: Sequence[float] = ()
+) -> Figure:
     """Mean squared end-to-end distance against time, R normalised by the contour length 2a(N−1).
 
     families: by name, the mean over fibers (S,), its standard error (S,), and the number of beads.
+    changed: times at which the case was.
     """
     figure = new_figure(6.4, 4.2)
     axes = figure.subplots()
@@ -74,6 +86,7 @@ def end_to_end_figure(times: NDArray, families: Mapping[str, tuple[NDArray, NDAr
         axes.plot(times, mean, color=colour, linestyle=line, marker=marker, label=label)
         axes.fill_between(times, mean - error, mean + error, color=colour, alpha=0.2, linewidth=0)
     axes.axhline(1, color="0.45", linewidth=1, linestyle="--")
+    _mark(changed, axes)
     axes.set(xlabel="t [s]", ylabel="⟨R²⟩ / L²,  L = 2a(N−1)", ylim=(0, 1.05))
     axes.legend(loc="lower left")
     return figure

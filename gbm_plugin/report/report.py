@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..case.changes import changes
 from ..case.layout import results
 from ..case.mesh import box_mesh
 from ..case.trust import check_case
@@ -53,8 +54,9 @@ def report(case_dir: Path | str) -> dict:
     key.update(files=[], not_drawn=[])
     folder = case / "report"
     with styled():
-        table = _attempt(key, "k and ε against time", _flow, case, folder, key)
         recording = _attempt(key, "fibers", open_recording, results(case))
+        key["changes"] = _changes(recording) if recording is not None else []
+        table = _attempt(key, "k and ε against time", _flow, case, folder, key)
         try:
             field = _attempt(key, "E(k)", _spectrum, case, folder, key, table, recording)
             if recording is not None and len(recording.times):
@@ -74,6 +76,13 @@ def report(case_dir: Path | str) -> dict:
     return key
 
 
+def _changes(recording: Recording) -> list[dict]:
+    """What was changed in the dictionaries at which restart."""
+    pairs = zip(recording.starts[:-1], recording.starts[1:], strict=True)
+    found = ({"time": time, "changes": changes(before, now)} for (_, before), (time, now) in pairs)
+    return [change for change in found if change["changes"]]
+
+
 def _attempt(key: dict, what: str, function, *arguments):
     """A part of the report, or None and the reason why there is none."""
     try:
@@ -90,7 +99,10 @@ def _flow(case: Path, folder: Path, key: dict) -> dict[str, NDArray]:
     key["not_drawn"] += [
         f"{name}: no such column in the table of the forcing" for name in _FLOW if name not in table
     ]
-    key["files"] += [_write_csv(folder / "flow.csv", table), *save(energy_figure(table), folder, "energy")]
+    key["files"] += [
+        _write_csv(folder / "flow.csv", table),
+        *save(energy_figure(table, _when(key)), folder, "energy"),
+    ]
     late = _second_half(table["Time"])
     flow = {"time": [table["Time"][0], table["Time"][-1]], "averaged_from": table["Time"][late][0]}
     flow |= {figure: _mean(table[name][late]) for name, figure in _FLOW.items() if name in table}
@@ -182,7 +194,7 @@ def _fibers(recording: Recording, folder: Path, key: dict) -> None:
         }
     key["files"] += [
         _write_csv(folder / "fibers.csv", columns),
-        *save(end_to_end_figure(recording.times, curves), folder, "end_to_end"),
+        *save(end_to_end_figure(recording.times, curves, _when(key)), folder, "end_to_end"),
     ]
     key["fibers"] = {
         "time": [recording.times[0], recording.times[-1]],
@@ -218,6 +230,10 @@ def _picture(recording: Recording, folder: Path, key: dict, field: tuple[float, 
             apart = abs(recording.times[nearest] - time) > 1e-3 * interval
             row, flow = nearest, (vorticity, "|∇×u| [1/s]" + (f" at t = {time:g} s" if apart else ""))
     key["files"] += save(fibers_picture(recording, row, flow), folder, "fibers")
+
+
+def _when(key: dict) -> list[float]:
+    return [change["time"] for change in key["changes"]]
 
 
 def _second_half(times: NDArray) -> NDArray[np.bool_]:

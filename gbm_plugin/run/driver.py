@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import math
 import os
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,8 @@ from ..case.times import Start
 from ..errors import CaseError, RunError
 from ..fleet.fleet import Fleet
 from ..fleet.journal import Journal
+from ..signals import Asked, handled
+from .continued import compare
 from .progress import Progress
 from .words import closing, opening
 
@@ -88,6 +89,7 @@ class Run:
             )
         self.fleet = Fleet.seeded(scene, scene.origin, np.add(scene.origin, scene.box), start.time)
         if start.continues:
+            compare(scene)
             folder = scene.case / _name(start.time)
             carrier.restore(folder, start.time)
             self.fleet.restore(folder)
@@ -100,8 +102,7 @@ class Run:
 
     def to_the_end(self) -> bool:
         """Up to scene.end_time; False where a signal stopped it before, after the step under way."""
-        stop: list[int] = []
-        handlers = {n: signal.signal(n, lambda *_: stop.append(1)) for n in (signal.SIGINT, signal.SIGTERM)}
+        stop = Asked()
         scene = self.scene
         every = scene.write_interval / scene.time_step
         every = round(every) if math.isfinite(every) else 0
@@ -109,7 +110,7 @@ class Run:
         self.step = round(self.start.time / scene.time_step)
         last = self.step + round((scene.end_time - self.start.time) / scene.time_step)
         try:
-            with Progress(scene, self.start.time) as progress:
+            with handled(stop.note), Progress(scene, self.start.time) as progress:
                 self._observe()
                 while self.step < last:
                     self._advance()
@@ -123,8 +124,6 @@ class Run:
         finally:
             self.journal.close()
             self.carrier.close()
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
         closing(scene, scene.case)
         return True
 

@@ -13,27 +13,35 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from ..case.check import check_forcing, check_mesh, check_openfoam, notes
 from ..case.disk import Room
-from ..case.layout import FIBERS, log_file
+from ..case.layout import FIBERS, cause_file, log_file
 from ..case.lock import DAEMON, RUN, locked
 from ..case.log import shorten, summary
-from ..case.openfoam import command, environment, fatal_message
+from ..case.openfoam import command, environment, fatal_message, last_words
 from ..case.prepare import prepare, ranks_of, reconstruct
 from ..case.scene import Scene, read_scene
 from ..case.share import Share, all_shares
 from ..case.times import choose_start
 from ..case.trust import check_case
-from ..errors import RunError
+from ..errors import RunError, Stopped
 from ..files import created
 from ..output.restarts import keep_earlier
+from ..signals import TELL, Asked, handled, kept_from_children
+from .continued import compare
 from .driver import COMPLETE
 from .progress import Progress, newest_row
 from .standstill import Pulse, kill_session, where_it_stands
+from .warnings import Warnings
 from .words import closing, opening
 
 log = logging.getLogger(__name__)
 
 STOPPED = "stopped on request; everything is written: the same command continues"
+STOPPED_EARLY = "stopped on request before the first step: the same command begins again"
+STOPPED_ELSEWHERE = (
+    "stopped on request; everything is written: startFrom latestTime in system/controlDict continues it"
+)
 LOOK = 10.0  # how often the room on the disk is looked at [s]
 GRACE = 5.0  # how long one side may outlive the other that failed, before it is ended [s]
 FULL = 1 << 20  # a disk with less room may be why OpenFOAM failed [bytes]
@@ -47,6 +55,7 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
     """
     case = Path(case).resolve()
     scene = read_scene(case)
+    check_openfoam(scene)
     ranks = ranks_of(case, parallel)
     with _only_run(case) as lock:
         start = choose_start(case, scene.start_time, scene.end_time, scene.time_step, fresh, scene.start_from)
@@ -54,7 +63,13 @@ def run(case: Path | str, *, parallel: bool = False, fresh: bool = False) -> Non
             reconstruct(case)
             log.info(COMPLETE, start.time)
             return
+        if start.continues:
+            compare(scene)
         scene = prepare(scene, start, ranks)
+        check_mesh(case)
+        check_forcing(scene, f"{start.time:.12g}")
+        for note in notes(scene):
+            log.info("note: %s", note)
         _remove_addresses(case)
         opening(scene, start.time, f"; see log.{scene.application} and log.gbmDaemon in {case}")
         _Processes(scene, ranks, start.time, lock).run()
@@ -81,7 +96,7 @@ def _run_here(case: Path | str, engine: Callable[..., bool], options: dict) -> N
     case = Path(case).resolve()
     with _only_run(case):
         if not engine(read_scene(case), **options):
-            raise RunError(STOPPED)
+            raise Stopped(STOPPED)
 
 
 @contextmanager
@@ -107,20 +122,23 @@ class _Daemon:
     """One daemon of a run: its process and its log."""
 
     def __init__(self, case: Path, share: Share):
-        self.share = share
+        self.case, self.share = case, share
         self.log = log_file(case, share.name("gbmDaemon"))
         # -P: not a folder gbm_plugin that happens to be here
         self.argv = [sys.executable, "-P", "-m", "gbm_plugin.cli", "daemon", str(case)]
         if share.of > 1:
             self.argv += ["--share", str(share.number)]
         self.process: subprocess.Popen | None = None
-        self._asked = False
 
     def ask_to_stop(self) -> None:
-        """Once: the daemon then asks OpenFOAM to write and end, and a second signal would end it at once."""
-        if self.process is not None and not self._asked:
-            self._asked = True
-            self.process.terminate()
+        """It then asks OpenFOAM to write and end."""
+        if self.process is not None and self.process.poll() is None:
+            self.process.send_signal(TELL)
+
+    def cause(self) -> str | None:
+        """Why it failed, as it left it."""
+        file = cause_file(self.case, self.share)
+        return file.read_text().strip() if file.is_file() else None
 
 
 class _Processes:
@@ -136,33 +154,33 @@ class _Processes:
         self.lock = lock
         self._room, self._next_look = Room(scene), 0.0
         self.solver: subprocess.Popen | None = None
-        self.stopping = 0
+        self.stopping = Asked()
         self.ended_here: set[subprocess.Popen] = set()  # by this process, after another one's end
         self.standstill = ""  # what was seen of a run that made no step
 
     def run(self) -> None:
         # in sessions of their own: Ctrl-C reaches this process alone, which then ends all in order
         solver = command(self.scene.application, self.case, self.ranks)
-        handlers = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
         # the cores that the solver leaves; one that they share, if it leaves none
         cores = max(1, (len(os.sched_getaffinity(0)) - self.ranks) // len(self.daemons))
-        try:
-            for daemon in self.daemons:
-                daemon.process = self._start(daemon.argv, daemon.log, NUMBA_NUM_THREADS=str(cores))
-                if self.stopping:  # before there was a daemon to tell
-                    daemon.ask_to_stop()
-            self.solver = self._start(solver, self.solver_log)
-            self._watch()
-        finally:
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
-            for process in filter(None, (self.solver, *(d.process for d in self.daemons))):
-                self._end(process)
+        with handled(self._stop):
+            try:
+                for daemon in self.daemons:
+                    cause_file(self.case, daemon.share).unlink(missing_ok=True)
+                    daemon.process = self._start(daemon.argv, daemon.log, NUMBA_NUM_THREADS=str(cores))
+                if not self.stopping:
+                    self.solver = self._start(solver, self.solver_log)
+                self._watch()
+            finally:
+                for daemon in self.daemons:
+                    self._end(daemon)
+                self._kill_solver()
         self._judge()
 
     def _start(self, argv: list[str], log_file: Path, **variables: str) -> subprocess.Popen:
         keep_earlier(log_file)
-        with created(log_file, "a") as output:  # which `shorten` may cut
+        # a queue asks all processes of a job: daemons answer when they can, and tell the solver, which never listens
+        with created(log_file, "a") as output, kept_from_children():  # which `shorten` may cut
             return subprocess.Popen(
                 argv,
                 env=environment() | variables,
@@ -173,28 +191,43 @@ class _Processes:
                 pass_fds=(self.lock,),
             )
 
-    def _end(self, process: subprocess.Popen) -> None:
-        """The process and all that it started are gone when this returns."""
-        if process.poll() is None:
-            self.ended_here.add(process)
-            process.terminate()
+    def _end(self, daemon: _Daemon) -> None:
+        """The daemon and all that it started are gone when this returns."""
+        if daemon.process is None:
+            return
+        if daemon.process.poll() is None:
+            self.ended_here.add(daemon.process)
+            daemon.ask_to_stop()
             with suppress(subprocess.TimeoutExpired):  # where it hangs, or was stopped
-                process.wait(3)
-        kill_session(process.pid)
-        process.wait()
+                daemon.process.wait(3)
+        kill_session(daemon.process.pid)
+        daemon.process.wait()
 
-    def _stop(self, *_) -> None:
-        self.stopping += 1
-        if self.stopping == 1:
+    def _kill_solver(self) -> None:
+        """With all its ranks, at once: it does not listen to anything gentler."""
+        if self.solver is None:
+            return
+        if self.solver.poll() is None:
+            self.ended_here.add(self.solver)
+        kill_session(self.solver.pid)
+        self.solver.wait()
+
+    def _stop(self, number: int) -> None:
+        first = not self.stopping
+        self.stopping.note(number)
+        if first:
             log.info("stopping: the flow is written after the step under way (once more: at once)")
             for daemon in self.daemons:
                 daemon.ask_to_stop()
-        elif self.solver is not None:
-            self.solver.terminate()
+        elif self.stopping.again and self.solver is not None:
+            kill_session(self.solver.pid)
 
     def _watch(self) -> None:
         """Until all have ended, one has outlived another for too long, or none makes a step any more."""
+        if self.solver is None:
+            return
         everyone = [self.solver, *(d.process for d in self.daemons)]
+        warnings = Warnings(self.case)
         pulse = Pulse(self.case, [self.solver_log, *(d.log for d in self.daemons)])
         limit = self.scene.coupling.timeout + GRACE  # who waits for another knows more, and gives up first
         alone_since = None
@@ -204,6 +237,8 @@ class _Processes:
                 progress.update()
                 shorten(self.solver_log)
                 self._look_after_room()
+                for line in warnings.news():
+                    log.warning("%s", line)
                 if all(process.poll() is None for process in everyone):
                     if pulse.silence() > limit:
                         self.standstill = self._where_all_stand(limit)
@@ -218,6 +253,8 @@ class _Processes:
                 elif time.monotonic() - alone_since > grace:
                     break
             progress.update()
+        for line in warnings.news():
+            log.warning("%s", line)
 
     def _look_after_room(self) -> None:
         if time.monotonic() >= self._next_look:
@@ -236,35 +273,40 @@ class _Processes:
     def _dismiss(self) -> None:
         """End at once who would only wait for a partner that does not come."""
         if self.solver.poll():
-            left = [d.process for d in self.daemons if d.process.poll() is None]
-        else:
-            left = [self.solver] if self.stopping and self.solver.poll() is None else []
-        for process in left:  # a daemon in a session is merely asked for the end
-            self.ended_here.add(process)
-            process.terminate()
+            for daemon in self.daemons:  # one in a session is merely asked for the end
+                if daemon.process.poll() is None:
+                    self.ended_here.add(daemon.process)
+                    daemon.ask_to_stop()
+        elif self.stopping and self.solver.poll() is None:
+            self._kill_solver()
 
     def _judge(self) -> None:
         if self.standstill:
             raise RunError(self.standstill)
+        if self.solver is None:
+            raise Stopped(STOPPED_EARLY)
         solver = self.solver.returncode
         problem = fatal_message(self.solver_log)
         if not any((solver, *(d.process.returncode for d in self.daemons))):
             if self.stopping:
-                raise RunError(STOPPED)
+                raise Stopped(STOPPED if self.scene.start_from == "latestTime" else STOPPED_ELSEWHERE)
             log.info("%s: %s", self.scene.application, summary(self.solver_log))
             return
         if self.stopping and not problem:
-            raise RunError("stopped at once; the same command continues from the latest time that is written")
+            raise Stopped("stopped at once; the same command continues from the latest time that is written")
         name = self.scene.application
         causes = []
         # one that was ended here is not the cause
         if solver < 0 and not problem and self.solver not in self.ended_here:
             causes.append(f"{name} was ended by {signal.Signals(-solver).name} ({self.solver_log})")
+        if solver > 0 and not problem and self.solver not in self.ended_here:
+            said = last_words(self.solver_log)
+            causes.append(f"{name} ended with exit code {solver} and said last '{said}' ({self.solver_log})")
         for d in self.daemons:
             if d.process.returncode < 0 and d.process not in self.ended_here:
                 ended_by = signal.Signals(-d.process.returncode).name
                 causes.append(f"{d.share} was ended by {ended_by} ({d.log})")
-        errors = [(error, d.log) for d in self.daemons if (error := _last_error(d.log))]
+        errors = [(error, d.log) for d in self.daemons if (error := d.cause())]
         # where the solver repeats what one of them said, the others only lost the solver
         errors = [(error, file) for error, file in errors if problem and error in problem] or errors
         if not problem or "the daemon stopped:" in problem:
@@ -279,10 +321,3 @@ class _Processes:
         if shutil.disk_usage(self.case).free < FULL:
             causes.append(f"the disk of {self.case} is full")
         raise RunError("; ".join(causes))
-
-
-def _last_error(path: Path) -> str | None:
-    lines = [
-        line for line in path.read_text(errors="replace").splitlines() if line.startswith("gbm daemon: ")
-    ]
-    return lines[-1].removeprefix("gbm daemon: ") if lines else None

@@ -75,6 +75,10 @@ def run_spectral(
 
 def _set_initial(scene: Scene, solver: SpectralSolver) -> None:
     modes = read_initial_field(scene.case)
+    if isinstance(solver.forcing, LinearForcing) and not np.any(modes.amplitudes):
+        raise CaseError(
+            f"{scene.case}/system/initialFieldDict: the forcing {scene.forcing.name} has nothing to force, k = 0"
+        )
     try:
         solver.set_velocity(modes.on_lattice(scene.cells, offset=0.0))
     except ValueError as error:

@@ -6,6 +6,7 @@ to the folder `stored` in the case, laid out as a case itself.
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 from dataclasses import replace
@@ -25,6 +26,7 @@ from .driver import COMPLETE, Carrier, Run, results_folder
 
 log = logging.getLogger(__name__)
 
+RESOLVED = 1.0  # Kolmogorov times between fields: cubics then cost 1e-2 L in 7 of them, twice it 7e-2
 SOURCE_FILE = "uniform/stored.json"
 MOST = 1 << 16  # characters of it
 
@@ -61,7 +63,8 @@ def run_stored(
                 f"{fields}: box is {_listed(flow.box)}, that of {scene.case}/system/blockMeshDict is "
                 f"{_listed(scene.box)}: they must be the same"
             )
-    begin, end = _range(scene, flow)
+    begin, end = _range(scene, flow, every if fields is None else 0)
+    _warn_of_intervals(flow, begin, end)
     folder = results_folder(scene.case, "stored")
     start = choose_start(folder, begin, end, scene.time_step, fresh, makes_beginning=True)
     if start.complete:
@@ -77,8 +80,23 @@ def run_stored(
     return Run(replace(scene, case=folder, end_time=end), carrier, start).to_the_end()
 
 
-def _range(scene: Scene, flow: StoredFlow) -> tuple[float, float]:
-    """First and last time of the replay: the case's, as far as the fields reach."""
+def _warn_of_intervals(flow: StoredFlow, begin: float, end: float) -> None:
+    """A word where fields are too far apart to be interpolated between."""
+    times = flow.times
+    used = [b - a for a, b in itertools.pairwise(times) if b > begin and a < end]
+    ratio = max(used, default=0.0) / flow.kolmogorov_time(begin)
+    if ratio > RESOLVED:
+        log.warning(
+            "fields are up to %.2g Kolmogorov times apart: more than %g is not interpolated well in time "
+            "(docs/results/replay.md)",
+            ratio,
+            RESOLVED,
+        )
+
+
+def _range(scene: Scene, flow: StoredFlow, every: int) -> tuple[float, float]:
+    """First and last time of the replay: the case's, as far as the fields reach. every: how many of the fields that
+    the case writes count as one; 0 for those of another code."""
     first, last, step = flow.times[0], flow.times[-1], scene.time_step
     slack = SAME_TIME * step
     begin, end = scene.start_time, scene.end_time
@@ -95,7 +113,8 @@ def _range(scene: Scene, flow: StoredFlow) -> tuple[float, float]:
             f"{scene.end_time:g} there is no step of {step:g} within the fields, {first:.9g} to {last:.9g}"
         )
     end = begin + steps * step
-    refuse_gaps(flow.times, begin, end)
+    interval = scene.write_interval * every if every and np.isfinite(scene.write_interval) else 0.0
+    refuse_gaps(flow.times, begin, end, interval)
     return begin, end
 
 

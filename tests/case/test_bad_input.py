@@ -239,7 +239,7 @@ def test_mesh_that_is_not_periodic(small):
     shutil.rmtree(small / "0")
     line = refused(small)
     assert "patch 'zLow' is of type wall with 144 faces" in line
-    assert "periodic (cyclic) in all three directions" in line and "log.pimpleFoam" in line
+    assert "periodic (cyclic) in all three directions" in line and "polyMesh/boundary" in line
 
 
 @pytest.mark.openfoam

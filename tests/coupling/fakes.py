@@ -55,10 +55,10 @@ def until(condition: Callable[[], object], what: str, patience: float = PATIENCE
     return value
 
 
-def one_line(process: subprocess.Popen, command: str) -> str:
-    """What a gbm process that failed said in its one line of error."""
+def one_line(process: subprocess.Popen, command: str, code: int = 1) -> str:
+    """What a gbm process that failed, or with code 3 was stopped, said in its one line."""
     output, _ = process.communicate()
-    assert process.returncode == 1, output
+    assert process.returncode == code, output
     assert "Traceback" not in output
     errors = [line for line in output.splitlines() if line.startswith(f"gbm {command}: ")]
     assert len(errors) == 1 and output.splitlines()[-1] == errors[0], output
@@ -315,8 +315,8 @@ class Run:
         for pid in both.values():
             until(lambda pid=pid: not alive(pid), f"the end of {pid}")
 
-    def line(self) -> str:
-        return one_line(self.process, "run")
+    def line(self, code: int = 1) -> str:
+        return one_line(self.process, "run", code)
 
 
 def kill_all_of(case: Path) -> None:

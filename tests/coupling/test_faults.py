@@ -429,7 +429,7 @@ def test_daemon_without_a_solver_waits_until_it_is_stopped(copy):
     until(lambda: daemon.poll() is not None or _wakes(daemon.pid) > before + 8, "its waking up")
     assert daemon.poll() is None
     daemon.terminate()
-    assert "stopped before OpenFOAM came" in one_line(daemon, "daemon")
+    assert "stopped before OpenFOAM came" in one_line(daemon, "daemon", code=3)
     assert not (prepared / "gbm.sock").exists()
 
 
@@ -611,7 +611,7 @@ def test_run_stopped_on_request(number, long_case):
     run = Run(long_case)
     run.at_step(7)
     run.process.send_signal(number)
-    line = run.line()
+    line = run.line(code=3)
     assert "stopped on request; everything is written" in line
     last = records(long_case) - 1
     folder = long_case / f"{0.02 * last:g}"
@@ -623,7 +623,7 @@ def test_stopped_before_the_first_step(long_case):
     run = Run(long_case)
     until(lambda: "daemon" in children(run.process.pid), "the daemon's start")
     run.process.terminate()
-    assert "stopped" in run.line()
+    assert "stopped" in run.line(code=3)
 
 
 def test_two_runs_in_one_case(long_case):

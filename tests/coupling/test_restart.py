@@ -136,7 +136,7 @@ def test_stopped_on_request_and_continued(make, whole):
     run = Run(case)
     run.at_step(6)
     run.process.send_signal(signal.SIGINT)
-    assert "stopped on request; everything is written" in run.line()
+    assert "stopped on request; everything is written" in run.line(code=3)
     stopped = [p for p in case.glob("0.[0-9]*") if p.is_dir()]
     assert len(stopped) == 1 and 0.12 <= float(stopped[0].name) < 0.4
     set_entry(case / "system/controlDict", "writeInterval", "20")

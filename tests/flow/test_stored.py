@@ -211,3 +211,23 @@ def test_gaps_in_time():
     refuse_gaps(times, 0, 1)
     with pytest.raises(ValueError, match="between the times 1 and 3"):
         refuse_gaps(times, 2.9, 6)
+
+
+def test_a_run_that_was_stopped_has_no_gaps():
+    """Written every 3, and where it was stopped: 1.08, 2 and 2.5 after; no field is missing."""
+    times = np.array([0, 2, 3, 3.08, 5.5, 6, 7.08, 9])
+    refuse_gaps(times, 0, 9, written_every=3)
+    with pytest.raises(ValueError, match="no field is stored"):
+        refuse_gaps(np.array([0, 2, 3, 3.08, 9, 12]), 0, 12, written_every=3)
+
+
+def test_kolmogorov_time_of_an_abc_flow():
+    """omega = u: <|omega|^2> = A^2 + B^2 + C^2 = 50, but for central differences, sin(kh)/kh."""
+    n = 32
+    x, y, z = np.meshgrid(*[(np.arange(n) + 0.5) * 2 * np.pi / n] * 3, indexing="ij")
+    u = np.stack(
+        [5 * np.sin(z) + 3 * np.cos(y), 4 * np.sin(x) + 5 * np.cos(z), 3 * np.sin(y) + 4 * np.cos(x)]
+    )
+    flow = StoredFlow([0.0, 1.0], lambda number: u, (2 * np.pi,) * 3)
+    h = 2 * np.pi / n
+    assert flow.kolmogorov_time(0.2) == pytest.approx(50**-0.5 / (np.sin(h) / h), rel=1e-9)

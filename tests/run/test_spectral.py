@@ -92,7 +92,7 @@ def test_a_signal_stops_it_cleanly(tmp_path):
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGTERM)
     _, errors = process.communicate()
-    assert process.returncode == 1 and "stopped on request" in errors and "Traceback" not in errors
+    assert process.returncode == 3 and "stopped on request" in errors and "Traceback" not in errors
     saved = [p for p in (path / "spectral").glob("*/uniform/fibers.npz")]
     assert len(saved) == 1
 

@@ -203,7 +203,7 @@ def test_a_signal_stops_it_cleanly(tmp_path):
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGTERM)
     _, errors = process.communicate()
-    assert process.returncode == 1 and "stopped on request" in errors and "Traceback" not in errors
+    assert process.returncode == 3 and "stopped on request" in errors and "Traceback" not in errors
     [saved] = (path / "stored").glob("*/uniform/fibers.npz")
     assert float(saved.parent.parent.name) == pytest.approx(
         float(table.read_text().split("\n")[-2].split()[0])

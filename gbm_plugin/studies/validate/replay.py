@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from ...case.copies import copy_case
 from ...case.layout import results
 from ...case.scene import read_scene
-from ...errors import RunError
+from ...errors import RunError, Stopped
 from ...flow.stored import POINTS_IN_TIME
 from ...output.recording import open_recording
 from ...output.tables import read_forcing
@@ -134,7 +134,7 @@ def _distances(live: Path, in_time: str, every: int) -> dict[str, float]:
     scene = replace(read_scene(live), write_interval=math.inf)
     shutil.rmtree(live / "stored", ignore_errors=True)
     if not run_stored(scene, in_time=in_time, every=every):
-        raise RunError(STOPPED)
+        raise Stopped(STOPPED)
     result = {}
     with (
         open_recording(results(live)) as a,
