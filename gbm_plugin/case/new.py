@@ -61,6 +61,15 @@ PRESETS = {
             "system/controlDict": {"endTime": 4, "writeInterval": 25},
         },
     ),
+    "boxFoam": Preset(
+        "the same by boxFoam, the solver made for the box: 64^3, sampled in sixth order, viscosity 0.007",
+        {
+            "system/blockMeshDict": {"n": 64},
+            "constant/transportProperties": {"nu": 0.007},
+            "constant/fiberProperties": {"interpolation": "quintic", "recordInterval": 10},
+            "system/controlDict": {"application": "boxFoam", "deltaT": 0.015, "writeInterval": 200},
+        },
+    ),
     "flow-I": Preset(
         "Flow I of the paper: 128^3, Eswaran-Pope forcing, epsilon 0.0015, Re_lambda 52; hours",
         {

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from gbm_plugin.case.openfoam import fatal_message, utility
+from gbm_plugin.output.recording import open_recording
 
 from box_cases import box_case, run, velocity
-from conftest import HEADER, divide, set_entry, solver_log, start_solver
+from conftest import HEADER, divide, make_case, run_case, set_entry, solver_log, start_solver
 
 pytestmark = pytest.mark.openfoam
 
@@ -35,6 +36,24 @@ def test_restart_to_the_same_bits(tmp_path, ranks):
         for name in ("uniform/boxFoam", "U", "p", "phi"):
             a, b = ((case / folder / "0.16" / name).read_bytes() for case in (whole, parts))
             assert a == b, name
+
+
+@pytest.mark.parametrize("options", [(), ("--parallel",)], ids=["serial", "parallel"])
+def test_fibers_ride(tmp_path, options):
+    """A run of flow and fibers that was stopped in between equals one that was not, to the same bits."""
+    positions = []
+    for ends in ((8,), (4, 8)):
+        path = make_case(
+            tmp_path / str(len(ends)), cells=12, steps=8, time_step=0.02, write_every=4, fv_options=POWER,
+            interpolation="quintic", application="boxFoam", prepared=False,
+        )  # fmt: skip
+        for end in ends:
+            set_entry(path / "system/controlDict", "endTime", repr(end * 0.02))
+            run_case(path, *options)
+        with open_recording(path / "postProcessing/fibers") as recording:
+            assert len(recording.times) == 9
+            positions.append(recording.families["test"].positions[:])
+    np.testing.assert_array_equal(*positions)
 
 
 def test_ranks_agree(tmp_path):
