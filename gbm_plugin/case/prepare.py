@@ -37,10 +37,15 @@ def prepare(scene: Scene, start: Start, ranks: int) -> Scene:
         initial_fields(scene, start.time)
     if not has_mesh(case) and not processors(case):
         raise CaseError(f"{case} has no mesh (constant/polyMesh) and no system/blockMeshDict to make one")
-    if not (case / f"{case.name}.foam").is_file():  # ParaView opens the case by this name
-        created(case / f"{case.name}.foam").close()
+    name_for_paraview(case)
     _decompose(scene, start, ranks)
     return scene
+
+
+def name_for_paraview(folder: Path) -> None:
+    """The empty file by whose name ParaView opens a case."""
+    if not (folder / f"{folder.name}.foam").is_file():
+        created(folder / f"{folder.name}.foam").close()
 
 
 def make_mesh(case: Path) -> None:

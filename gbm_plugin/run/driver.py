@@ -16,6 +16,7 @@ import numpy as np
 from ..case.disk import Room
 from ..case.initial import write_velocity
 from ..case.layout import STATE_FILE, results
+from ..case.prepare import name_for_paraview
 from ..case.scene import Scene
 from ..case.times import Start
 from ..errors import CaseError, RunError
@@ -69,6 +70,7 @@ def results_folder(case: Path, name: str) -> Path:
         for part in ("constant", "system"):
             if not (folder / part).exists():
                 os.symlink(Path("..") / part, folder / part)
+        name_for_paraview(folder)
     except OSError as error:
         raise RunError(f"cannot write in {folder}: {error.strerror}") from None
     return folder

@@ -60,3 +60,9 @@ def test_a_flow_that_is_not_finite_is_refused_at_its_step(tmp_path):
         FloatingPointError, match=r"sampled velocity is not finite at fiber 0, time 0\.14, after step 7"
     ):
         run(tmp_path, Wind(7, np.nan)).to_the_end()
+
+
+def test_results_open_in_paraview_by_their_name(tmp_path):
+    folder = results_folder(tmp_path, "spectral")
+    assert (folder / "spectral.foam").is_file()
+    assert (folder / "constant").is_symlink() and (folder / "system").is_symlink()
