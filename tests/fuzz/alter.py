@@ -122,7 +122,8 @@ def _changed(array: np.ndarray, random: Random) -> tuple[str, np.ndarray]:
             [np.nan, np.inf, -1.0, 0.0, 1e300, -1e-300]
         )
     elif how == "type":
-        values = values.astype(random.choice(["f4", "i8", "c16", ">f8", "f2", "U9", "?", "S3"]))
+        kind = random.choice(["f4", "i8", "c16", ">f8", "f2", "U9", "?", "S3"])
+        values = np.zeros(values.shape, kind) if values.dtype.kind == "U" else values.astype(kind)
     elif how == "scaled" and values.dtype.kind in "fc":
         values = values * random.choice([-1.0, 1.0 + 1e-3, 1e-300, 1e12, 1e300])
     elif how == "zero":

@@ -43,8 +43,8 @@ def fuzz(inputs: int, seed: int) -> list[dict]:
         found += done
         if worker.returncode == 0 and done:
             continue
-        if not lines:
-            raise RuntimeError(f"the worker does not begin:\n{worker.stderr[-3000:]}")
+        if not lines or "outcome" in lines[-1]:
+            raise RuntimeError(f"the worker fails between two readings:\n{worker.stderr[-3000:]}")
         last = lines[-1]  # what it was about when it died
         outcome = "hang" if "Timeout" in worker.stderr else f"crash ({worker.returncode})"
         found.append(last | {"outcome": outcome, "text": worker.stderr[-300:]})
