@@ -1,13 +1,34 @@
 """Which tests run: `pytest` alone those of pure Python, `pytest FILES` all in them, `pytest --all` every one.
 
-What needs OpenFOAM or takes long says so by a marker. A -m or -k of one's own is taken as it is.
+What needs OpenFOAM or takes long says so by a marker. A -m or -k of one's own is taken as it is. OpenFOAM's programs
+refuse to run in a test that is not marked.
 """
 
 from __future__ import annotations
 
+import os
+import tempfile
+from pathlib import Path
+
 import pytest
 
 LEFT_OUT = ("openfoam", "slow")  # of a run that names nothing
+PROGRAMS = [
+    "blockMesh",
+    "decomposePar",
+    "foamDictionary",
+    "foamToVTK",
+    "icoFoam",
+    "mpirun",
+    "pimpleFoam",
+    "pisoFoam",
+    "postProcess",
+    "reconstructPar",
+    "renumberMesh",
+]
+REFUSAL = '#!/bin/sh\necho "this test runs ${0##*/} and is not marked openfoam" >&2\nexit 1\n'
+
+_refusals = tempfile.TemporaryDirectory(prefix="gbm-tests-")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -18,6 +39,10 @@ def pytest_configure(config: pytest.Config) -> None:
     named = config.args_source is not pytest.Config.ArgsSource.TESTPATHS
     if named or config.option.markexpr or config.option.keyword:
         config.option.all = True  # xdist hands the options to its workers
+    for name in PROGRAMS:
+        program = Path(_refusals.name) / name
+        program.write_text(REFUSAL)
+        program.chmod(0o755)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -26,3 +51,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = [item for item in items if any(item.get_closest_marker(name) for name in LEFT_OUT)]
     config.hook.pytest_deselected(items=left_out)
     items[:] = [item for item in items if item not in set(left_out)]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item):
+    path = os.environ["PATH"]
+    if not item.get_closest_marker("openfoam"):
+        os.environ["PATH"] = os.pathsep.join([_refusals.name, path])
+    try:
+        return (yield)
+    finally:
+        os.environ["PATH"] = path
