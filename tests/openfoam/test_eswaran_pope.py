@@ -20,6 +20,8 @@ from gbm_plugin.spectral.normals import normals
 
 from conftest import HEADER, divide, make_case, set_entry, solver_log, start_solver
 
+pytestmark = pytest.mark.openfoam
+
 PLUGIN = Path(__file__).parents[2] / "gbm_plugin/openfoam/eswaranPope"
 CELLS, STEP, T_L, CUTOFF = 12, 0.1, 0.5, 8**0.5
 SMOOTH = "field random; kineticEnergy 0.2; peakWavenumber 1; maxWavenumber 1;"

@@ -100,6 +100,7 @@ def test_a_signal_stops_it_cleanly(tmp_path):
 ESWARAN_POPE = "stirring { type eswaranPope; variance 5e-3; timeScale 0.5; cutoff 2.8284; seed 4; }"
 
 
+@pytest.mark.openfoam
 def test_one_force_in_both_engines(tmp_path):
     """The same entry drives both; each has its table under the entry's name. From one field, one power at t = 0."""
     path = make_case(tmp_path / "case", steps=5, prepared=False, fv_options=ESWARAN_POPE)
