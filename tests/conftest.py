@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gbm_plugin.case.made import RECORD
 from gbm_plugin.case.openfoam import command, environment
 from gbm_plugin.case.prepare import initial_fields, make_mesh, utility
 from gbm_plugin.case.scene import read_scene
@@ -123,11 +124,13 @@ def prepare(path: Path) -> None:
     if kept.is_dir():
         for part in parts:  # newer than the dictionaries, or a run would make them again
             shutil.copytree(kept / part, path / part, copy_function=shutil.copyfile)
+        shutil.copyfile(kept / RECORD, path / RECORD)
     else:
         make_mesh(path)
         initial_fields(read_scene(path))
         for part in parts:
             shutil.copytree(path / part, kept / part)
+        shutil.copyfile(path / RECORD, kept / RECORD)
 
 
 def divide(case: Path, ranks: int, n: tuple | None) -> None:
