@@ -259,6 +259,7 @@ def test_mesh_that_is_not_a_box(small):
     mesh.write_text(text)
     set_entry(small / FIBERS, "interpolation", "cellPoint")
     (small / "system/initialFieldDict").unlink()
+    (small / "constant/fvOptions").unlink()  # which would miss a velocity first
     line = refused(small)
     assert "whole, axis-aligned box" in line
 
