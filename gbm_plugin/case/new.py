@@ -75,7 +75,12 @@ PRESETS = {
         {
             "system/blockMeshDict": {"n": 128},
             "constant/transportProperties": {"nu": 1e-3},
-            "system/controlDict": {"deltaT": 0.01, "endTime": 500, "writeInterval": 2000},
+            "system/controlDict": {
+                "application": "boxFoam",
+                "deltaT": 0.01,
+                "endTime": 500,
+                "writeInterval": 2000,
+            },
             "system/initialFieldDict": {"kineticEnergy": 0.025},
         },
         {

@@ -21,7 +21,7 @@ def test_every_preset_is_a_case(tmp_path, preset):
 def test_presets_have_their_own_numbers(tmp_path):
     flow = read_scene(new_case(tmp_path / "a", "flow-I"))
     assert flow.cells == (128, 128, 128) and flow.kinematic_viscosity == 1e-3
-    assert flow.forcing.type == "eswaranPope"
+    assert flow.forcing.type == "eswaranPope" and flow.application == "boxFoam"
     assert read_scene(new_case(tmp_path / "b", "taylor-green")).forcing is None
 
 

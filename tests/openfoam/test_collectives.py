@@ -42,7 +42,7 @@ CALLS = {
     ),
     "forcing/turbulenceForcing.C": (1, "made for each run"),
     "eswaranPope/eswaranPope.C": (
-        5,
+        4,
         "made for each run; called in addSup, endRate and correct of every rank",
     ),
     "fiberCoupling/fiberCoupling.C": (6, "once a step, provisional or not as all daemons together say"),

@@ -21,6 +21,7 @@ Foam::boxFlow::boxFlow
     column_(transform_.columnSize()),
     plane_(3*cells_.n().x()*cells_.n().y() + cells_.n().x()),
     inColumns_(false),
+    sources_(nullptr),
     now_(),
     energy_(width(), Zero),
     firsts_(width(), Zero),
@@ -55,6 +56,23 @@ void Foam::boxFlow::rowsOf
     for (label c = 0; c < 3; ++c)
     {
         rows[c] = column + place(0, z, c);
+    }
+}
+
+
+Foam::modeColumn Foam::boxFlow::columnAt(const label y, double* modes) const
+{
+    return modeColumn{cells_.n(), firstRow() + y, width(), modes};
+}
+
+
+void Foam::boxFlow::rateColumn(const label y)
+{
+    transform_.columnForward(y, column_.begin());
+
+    if (sources_)
+    {
+        sources_->addModes(columnAt(y, column_.begin()), nCells());
     }
 }
 
@@ -143,6 +161,7 @@ Foam::scalar Foam::boxFlow::set(const vectorField& U)
         transform_.planeForward(plane_.begin(), z, c);
     }
     inColumns_ = false;
+    sources_ = nullptr;
 
     const FixedList<scalarList, 3> resolved(k_.decay(0));
     const scalar normal = 1/nCells();
@@ -234,6 +253,11 @@ void Foam::boxFlow::evaluate(momentumSources& sources)
 
     scalar largest = 0, speed = 0, magnitudes = 0, sum = 0;
     sources.begin(now_);
+    sources_ = &sources;
+    for (label y = 0; y < nRows(); ++y)
+    {
+        sources.show(columnAt(y, modes_.begin() + place(y, 0, 0)));
+    }
 
     for (label z = 0; z < cells_.layers(); ++z)
     {
@@ -292,7 +316,7 @@ void Foam::boxFlow::pressure(volScalarField& p)
 
     for (label y = 0; y < nRows(); ++y)
     {
-        transform_.columnForward(y, column_.begin());
+        rateColumn(y);
         const scalar ky = k_.first(vector::Y)[firstRow() + y];
 
         for (label z = 0; z < cells_.n().z(); ++z)
@@ -357,7 +381,7 @@ void Foam::boxFlow::advance(const update& newModes)
 
     for (label y = 0; y < nRows(); ++y)
     {
-        transform_.columnForward(y, column_.begin());
+        rateColumn(y);
 
         const scalar ky = k_.first(vector::Y)[firstRow() + y];
         for (label z = 0; z < cells_.n().z(); ++z)

@@ -138,6 +138,28 @@ void Foam::momentumSources::add
 }
 
 
+void Foam::momentumSources::show(const modeColumn& u)
+{
+    for (explicitSource* source : explicit_)
+    {
+        source->show(u);
+    }
+}
+
+
+void Foam::momentumSources::addModes
+(
+    const modeColumn& rate,
+    const double factor
+) const
+{
+    for (const explicitSource* source : explicit_)
+    {
+        source->addModes(rate, factor);
+    }
+}
+
+
 void Foam::momentumSources::end()
 {
     for (explicitSource* source : explicit_)

@@ -1,6 +1,5 @@
 #include "eswaranPope.H"
 #include "periodicBox.H"
-#include "vectorised.H"
 #include "addToRunTimeSelectionTable.H"
 #include "fvMatrices.H"
 #include "mathematicalConstants.H"
@@ -12,46 +11,6 @@ namespace fv
     defineTypeNameAndDebug(eswaranPope, 0);
     addToRunTimeSelectionTable(option, eswaranPope, dictionary);
 }
-}
-
-namespace
-{
-
-//- rate += f; the sum of u f, in partial sums that vectorise
-VECTORISED
-double addForce
-(
-    const Foam::label n,
-    const double* __restrict__ f,
-    const double* __restrict__ u,
-    double* __restrict__ rate
-)
-{
-    constexpr Foam::label lanes = 8;
-    double sums[lanes] = {};
-    Foam::label i = 0;
-
-    for (; i + lanes <= n; i += lanes)
-    {
-        for (Foam::label j = 0; j < lanes; ++j)
-        {
-            sums[j] += u[i + j]*f[i + j];
-            rate[i + j] += f[i + j];
-        }
-    }
-    double sum = 0;
-    for (; i < n; ++i)
-    {
-        sum += u[i]*f[i];
-        rate[i] += f[i];
-    }
-    for (const double s : sums)
-    {
-        sum += s;
-    }
-    return sum;
-}
-
 }
 
 
@@ -148,6 +107,52 @@ void Foam::fv::eswaranPope::forAllRows(const cellRows::use& f) const
 }
 
 
+void Foam::fv::eswaranPope::findPlaces(const Vector<label>& n)
+{
+    const List<labelVector>& k = process_->k();
+    DynamicList<place> places;
+
+    for (label i = 0; i < 2*k.size(); ++i)
+    {
+        const label mode = i/2;
+        const bool conjugate = i % 2;
+        const labelVector q(conjugate ? -k[mode] : k[mode]);
+
+        if (q.x() >= 0)
+        {
+            // of the first cell centre
+            scalar angle = 0;
+            for (direction d = 0; d < vector::nComponents; ++d)
+            {
+                angle += constant::mathematical::pi*q[d]/n[d];
+            }
+            places.append
+            (
+                place
+                {
+                    mode, conjugate,
+                    (q.y() + n.y()) % n.y(), (q.z() + n.z()) % n.z(), q.x(),
+                    complex(std::cos(angle), std::sin(angle))
+                }
+            );
+        }
+    }
+    places_.transfer(places);
+}
+
+
+Foam::complex Foam::fv::eswaranPope::modeAt
+(
+    const place& p,
+    const direction d
+) const
+{
+    const amplitude& f = force_[p.mode];
+
+    return complex(f.re[d], p.conjugate ? -f.im[d] : f.im[d])*p.phase;
+}
+
+
 // * * * * * * * * * * * * Protected Member Functions  * * * * * * * * * * * //
 
 Foam::scalar Foam::fv::eswaranPope::power
@@ -182,9 +187,7 @@ Foam::scalar Foam::fv::eswaranPope::power
 
 Foam::scalar Foam::fv::eswaranPope::power(const flowStatistics&) const
 {
-    const scalar cells = returnReduce(scalar(mesh_.nCells()), sumOp<scalar>());
-
-    return returnReduce(work_, sumOp<scalar>())/cells;
+    return returnReduce(work_, sumOp<scalar>());
 }
 
 
@@ -269,37 +272,50 @@ void Foam::fv::eswaranPope::correct(volVectorField& U)
 }
 
 
-void Foam::fv::eswaranPope::addRate(const latticeLayer& layer)
+void Foam::fv::eswaranPope::show(const modeColumn& u)
 {
-    const auto centre = [&](const label i, const direction d)
+    if (places_.empty())
     {
-        return constant::mathematical::twoPi*(i + 0.5)/layer.n[d];
-    };
-    const label n = layer.n.x();
-
-    if (waves_.empty())
-    {
-        scalarField x(n);
-        forAll(x, i)
-        {
-            x[i] = centre(i, vector::X);
-        }
-        waves_ = modes_->along(x);
+        findPlaces(u.n);
     }
 
-    modes_->toPlane(force_, centre(layer.k, vector::Z));
-    for (label y = 0; y < layer.n.y(); ++y)
+    for (const place& p : places_)
     {
-        modes_->toRow(centre(y, vector::Y));
-        modes_->values(waves_, values_);
-
+        if (p.y != u.y)
+        {
+            continue;
+        }
         for (direction d = 0; d < vector::nComponents; ++d)
         {
-            work_ += addForce
-            (
-                n, values_[d].cdata(),
-                layer.velocity[d] + y*layer.stride, layer.rate[d] + y*n
-            );
+            const double* mode = u.row(p.z, d) + 2*p.x;
+            const complex f(modeAt(p, d));
+
+            // modes with negative kx are not stored
+            work_ += (p.x ? 2 : 1)*(mode[0]*f.real() + mode[1]*f.imag());
+        }
+    }
+}
+
+
+void Foam::fv::eswaranPope::addModes
+(
+    const modeColumn& rate,
+    const double factor
+) const
+{
+    for (const place& p : places_)
+    {
+        if (p.y != rate.y)
+        {
+            continue;
+        }
+        for (direction d = 0; d < vector::nComponents; ++d)
+        {
+            double* mode = rate.row(p.z, d) + 2*p.x;
+            const complex f(modeAt(p, d));
+
+            mode[0] += factor*f.real();
+            mode[1] += factor*f.imag();
         }
     }
 }

@@ -1,61 +1,5 @@
 #include "waveSum.H"
-#include "vectorised.H"
 #include "DynamicList.H"
-
-namespace
-{
-
-using namespace Foam;
-
-//- Waves that are summed in one pass
-constexpr label few = 4;
-
-
-//- f += sum c[2 k] wave[2 k] - c[2 k + 1] wave[2 k + 1]
-template<label N>
-INLINE void addFew
-(
-    const label n,
-    const double* __restrict__ c,
-    const double* const* __restrict__ wave,
-    double* __restrict__ f
-)
-{
-    for (label i = 0; i < n; ++i)
-    {
-        double sum = 0;
-
-        #pragma GCC unroll 4
-        for (label k = 0; k < N; ++k)
-        {
-            sum += c[2*k]*wave[2*k][i] - c[2*k + 1]*wave[2*k + 1][i];
-        }
-        f[i] += sum;
-    }
-}
-
-
-VECTORISED
-void addWaves
-(
-    const label n,
-    const label waves,
-    const double* c,
-    const double* const* wave,
-    double* f
-)
-{
-    switch (waves)
-    {
-        case 1: addFew<1>(n, c, wave, f); break;
-        case 2: addFew<2>(n, c, wave, f); break;
-        case 3: addFew<3>(n, c, wave, f); break;
-        default: addFew<few>(n, c, wave, f);
-    }
-}
-
-}
-
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
@@ -167,20 +111,19 @@ void Foam::waveSum::values
         f[d].setSize(table[0].size());
         f[d] = 2*lines_[0].re[d];
 
-        for (label first = 1; first <= reach_; first += few)
-        {
-            const label waves = min(few, reach_ + 1 - first);
-            const double* wave[2*few];
-            double c[2*few];
+        double* __restrict__ v = f[d].begin();
 
-            for (label k = 0; k < waves; ++k)
+        for (label k = 1; k <= reach_; ++k)
+        {
+            const double* __restrict__ cosine = table[2*k - 2].cdata();
+            const double* __restrict__ sine = table[2*k - 1].cdata();
+            const double re = 2*lines_[k].re[d];
+            const double im = 2*lines_[k].im[d];
+
+            forAll(f[d], i)
             {
-                c[2*k] = 2*lines_[first + k].re[d];
-                c[2*k + 1] = 2*lines_[first + k].im[d];
-                wave[2*k] = table[2*(first + k) - 2].cdata();
-                wave[2*k + 1] = table[2*(first + k) - 1].cdata();
+                v[i] += re*cosine[i] - im*sine[i];
             }
-            addWaves(f[d].size(), waves, c, wave, f[d].begin());
         }
     }
 }

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ...case.copies import copy_case
+from ...case.edit import set_entries
 from ...case.initial import write_velocity
 from ...case.layout import log_file, numbered, processors
 from ...case.openfoam import command, environment, fatal_message, utility
@@ -72,6 +73,7 @@ def run(
         if start is None:
             raise ValueError(f"{folder} is not there yet: a new run needs --start")
         _make(case, folder, preset, cells, times, start, ranks)
+    set_entries(folder / "system/controlDict", {"endTime": end})
     samples = _Samples(folder, out, cells, preset.viscosity)
     _solve(folder, ranks, samples)
     samples.write_spectrum(settle)
