@@ -1,16 +1,8 @@
 #include "kernels.H"
+#include "vectorised.H"
 
 #include <algorithm>
 #include <cmath>
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-    #define VECTORISED __attribute__                                           \
-        ((target_clones("default", "arch=haswell", "arch=skylake-avx512")))
-#else
-    #define VECTORISED
-#endif
-
-#define INLINE inline __attribute__((always_inline))
 
 namespace
 {

@@ -146,10 +146,18 @@ def run(
 
 
 def means(series: TimeSeries, settle: float) -> list[dict]:
-    """Mean and standard error of every column from `settle` on."""
-    names = [n for n in series.columns if n != "time"]
-    means = {n: series.mean(n, settle) for n in names}
-    return [{"quantity": n, "mean": m.value, "standard_error": m.error} for n, m in means.items()]
+    """Mean and standard error of every column from `settle` on; no error where the series is too short for one."""
+    if not len(series):
+        return []
+    late, result = series["time"] >= settle, []
+    for name in (n for n in series.columns if n != "time"):
+        try:
+            error = series.mean(name, settle).error
+        except ValueError:
+            error = None
+        mean = float(series[name][late].mean()) if late.any() else None
+        result.append({"quantity": name, "mean": mean, "standard_error": error})
+    return result
 
 
 def rows(result: dict) -> list[dict]:
@@ -160,5 +168,8 @@ def rows(result: dict) -> list[dict]:
 def table(result: dict) -> str:
     """The averages as text."""
     lines = [f"{result['flow']} at {result['cells']}^3"]
-    lines += [f"    {r['quantity']:24} {r['mean']:12.5g} ± {r['standard_error']:.2g}" for r in result["rows"]]
+    for r in result["rows"]:
+        mean = "nothing yet" if r["mean"] is None else f"{r['mean']:12.5g}"
+        error = "too short for an error" if r["standard_error"] is None else f"± {r['standard_error']:.2g}"
+        lines.append(f"    {r['quantity']:24} {mean} {error}")
     return "\n".join(lines)
