@@ -155,6 +155,12 @@ def notes(scene: Scene) -> list[str]:
         found.append(
             f"cells are {ratio:.2g} Kolmogorov lengths wide, more than {RESOLVED:g}: small eddies are not resolved"
         )
+    writes = (scene.end_time - scene.start_time) / scene.write_interval
+    if abs(writes - round(writes)) > 1e-3:  # also with an interval beyond the end
+        found.append(
+            f"OpenFOAM writes every {scene.write_interval:g} s and not at endTime {scene.end_time:g}: the same command "
+            "will repeat what follows the last time that is written"
+        )
     model = _turbulence_model(scene.case)
     if model not in ("laminar", None):
         found.append(

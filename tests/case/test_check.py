@@ -160,6 +160,13 @@ def test_worth_a_word(case):
     assert "note: fibers of family test" in gbm("info", case).stdout
 
 
+@pytest.mark.parametrize("interval, said", [("10", False), ("7", True), ("1000", True)])
+def test_an_end_that_is_not_written(interval, said, case):
+    set_entry(case / CONTROL, "writeInterval", interval)  # of 20 steps
+    found = [note for note in notes(read_scene(case)) if "not at endTime 0.4" in note]
+    assert len(found) == said
+
+
 def test_more_beads_than_memory(case):
     fibers = case / "constant/fiberProperties"
     fibers.write_text(fibers.read_text().replace("count 12", "count 500000000"))

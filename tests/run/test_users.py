@@ -76,6 +76,7 @@ def test_a_queue_that_ends_all_processes_of_a_job(how, case):
     with open_recording(case / "postProcessing/fibers") as recording:
         assert recording.times[-1] == pytest.approx(last)  # the step under way
     set_entry(case / CONTROL, "endTime", repr(round(last + 0.06, 6)))
+    set_entry(case / CONTROL, "writeInterval", "1")
     done = run_case(case, *(["--parallel"] if how == "parallel" else []))
     assert f"continuing from time {last:g}" in done.stdout
     assert gbm("run", case).stdout.endswith("is complete; --fresh repeats it\n")
