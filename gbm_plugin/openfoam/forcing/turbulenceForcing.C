@@ -206,21 +206,15 @@ void Foam::fv::turbulenceForcing::writeRow
 }
 
 
-void Foam::fv::turbulenceForcing::report
-(
-    const scalar time,
-    const flowStatistics& now,
-    const scalar power
-)
+// before anything is made of it: OpenFOAM's own traps would end the run there
+static void checkFinite(const Foam::flowStatistics& now, const Foam::scalar time)
 {
     if (!std::isfinite(now.k))
     {
         FatalErrorInFunction
             << "the velocity is not finite (k = " << now.k << ") at time "
-            << time << exit(FatalError);
+            << time << Foam::exit(Foam::FatalError);
     }
-
-    writeRow(time, now, power);
 }
 
 
@@ -241,9 +235,11 @@ void Foam::fv::turbulenceForcing::beginStep(const volVectorField& U)
 {
     nu_ = kinematicViscosity(mesh_);
     const flowStatistics now(U, nu_);
+    const scalar start = mesh_.time().value() - mesh_.time().deltaTValue();
+    checkFinite(now, start);
     const scalar powerNow = power(U, now);
 
-    report(mesh_.time().value() - mesh_.time().deltaTValue(), now, powerNow);
+    writeRow(start, now, powerNow);
     choose(now);
     keep(now, powerNow);
 }
@@ -292,6 +288,7 @@ void Foam::fv::turbulenceForcing::beginRate(const flowStatistics& now)
             deltaTOld_ = mesh_.time().deltaTValue();
         }
         explicit_ = true;
+        checkFinite(now, mesh_.time().value());
     }
     follow(now);
 }
@@ -302,7 +299,7 @@ void Foam::fv::turbulenceForcing::endRate()
     if (first_)
     {
         const scalar powerNow = power(now_);
-        report(mesh_.time().value(), now_, powerNow);
+        writeRow(mesh_.time().value(), now_, powerNow);
         keep(now_, powerNow);
     }
 }
