@@ -10,6 +10,8 @@ import pytest
 
 import gbm_plugin
 
+pytestmark = pytest.mark.slow  # each starts from an empty cache
+
 PACKAGE = Path(gbm_plugin.__file__).parent
 
 # counts what Numba compiles, whoever asks for it

@@ -208,6 +208,7 @@ def append_for_ever(path, done):
         done.value = step + 1
 
 
+@pytest.mark.slow
 def test_readable_after_sigkill(tmp_path):
     """Within an append or between two: a moment after the child has come to some number of them."""
     random.seed(1)

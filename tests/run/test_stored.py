@@ -241,8 +241,7 @@ def test_bad_folders_are_refused(case):
     )
     set_entry(case / "constant/fiberProperties", "interpolation", "cubic")
     set_entry(case / "system/blockMeshDict", "n", "20")
-    refused(case, "has (16, 16, 16) cells, system/blockMeshDict says (20, 20, 20)")
-    shutil.rmtree(case / "constant/polyMesh")
+    shutil.rmtree(case / "constant/polyMesh")  # while it is there, it decides
     refused(case, "0.12/U has 4096 values for 8000 cells")
 
 
