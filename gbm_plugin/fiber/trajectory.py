@@ -37,7 +37,7 @@ class Trajectory:
     report: counts of the stepper (steps, substeps, …, worst_error: the largest accepted estimate of an implicit
     step); samples of the flow; redone, parts of steps that were taken back; flow_error, the estimated error that came
     from extrapolating the flow, summed over the run, and worst_flow_error, its largest part: as worst_error, in fiber
-    lengths. fibers and flow are those of the run.
+    lengths; left, the fibers that left the flow. fibers: those at the start.
     """
 
     times: NDArray
