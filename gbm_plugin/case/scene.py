@@ -22,6 +22,8 @@ TRANSPORTS = ("socket", "tcp", "file")
 START_FROM = ("latestTime", "startTime", "firstTime")
 SHAPES = ("straight", "file")
 
+LABEL_MAX = 2**31 - 1  # of the 32 bits that OpenFOAM's labels have at least
+
 
 @dataclass(frozen=True)
 class Family:
@@ -333,7 +335,10 @@ def _linear_forcing(d: Dictionary) -> dict[str, float | str]:
 
 def _eswaran_pope(d: Dictionary) -> dict[str, float | str]:
     values = {name: d.number(name, above=0) for name in ("variance", "timeScale")}
-    return {**values, "cutoff": d.number("cutoff", least=1), "seed": d.integer("seed", 1, least=0)}
+    values |= {"cutoff": d.number("cutoff", least=1), "seed": d.integer("seed", 1, least=0)}
+    if values["seed"] > LABEL_MAX:
+        raise d.fail("seed", f"is {values['seed']}; allowed: 0 to {LABEL_MAX}, OpenFOAM's whole numbers")
+    return values
 
 
 def _read_viscosity(case: Path) -> float:

@@ -157,6 +157,18 @@ MISTAKES = {
     "no end": (CONTROL, re.compile(r"endTime\s+0.4;"), "", ["'endTime'", "is missing"]),
     "forcing without power": (OPTIONS, re.compile(r"\bpower\s+[\d.]+;"), "", ["'power'", "is missing"]),
     "forcing mode": (OPTIONS, "constantPower;", "gentle;", ["'mode'", "'gentle'", "constantCoefficient"]),
+    "cutoff below the lowest wave": (
+        OPTIONS,
+        ALL,
+        "f { type eswaranPope; variance 1; timeScale 1; cutoff 0.5; }",
+        ["'cutoff'", "is 0.5", "at least 1"],
+    ),
+    "seed that is no label": (
+        OPTIONS,
+        ALL,
+        "f { type eswaranPope; variance 1; timeScale 1; cutoff 2; seed 3000000000; }",
+        ["'seed'", "3000000000", "allowed: 0 to 2147483647"],
+    ),
     "forcing without type": (OPTIONS, re.compile(r"type\s+linearForcing;"), "", ["'type'", "is missing"]),
     "brace left open": (FIBERS, re.compile(r"\}\s*\Z"), "", ["not an OpenFOAM dictionary"]),
     "unfinished entry": (FIBERS, "beads 6;", "beads 6", []),
