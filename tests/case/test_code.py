@@ -36,6 +36,7 @@ def evil(tmp_path):
     return case, mark
 
 
+@pytest.mark.openfoam
 def test_info_and_report_run_nothing(evil):
     """Macros are expanded by a program of OpenFOAM, which loads no library of the case."""
     case, mark = evil

@@ -128,6 +128,7 @@ def written(tmp_path_factory):
 
 
 @pytest.mark.parametrize("form, packed", [("ascii", "off"), ("ascii", "on"), ("binary", "off")])
+@pytest.mark.openfoam
 def test_what_openfoam_writes_and_fluidfoam_reads(written, form, packed, tmp_path):
     """All of OpenFOAM's formats, decomposed ones too: the same numbers, and those that a user's fluidfoam sees."""
     case = shutil.copytree(written, tmp_path / "case")
@@ -148,6 +149,7 @@ def test_what_openfoam_writes_and_fluidfoam_reads(written, form, packed, tmp_pat
     np.testing.assert_allclose(theirs, again, rtol=0, atol=1e-14)
 
 
+@pytest.mark.openfoam
 def test_meshes(written, tmp_path):
     cells, origin, size = box_mesh(written)
     assert cells == (10, 10, 10)
@@ -161,6 +163,7 @@ def test_meshes(written, tmp_path):
 CODE = "__import__('pathlib').Path('{}').touch()"
 
 
+@pytest.mark.openfoam
 def test_a_field_is_not_a_program(written, tmp_path):
     """fluidfoam 0.3.1 evaluates what stands in brackets on lines that begin with `dimensions`."""
     case = shutil.copytree(written, tmp_path / "case")

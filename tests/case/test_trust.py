@@ -34,6 +34,7 @@ def home(tmp_path):
     assert {p.name: (p.read_text(), p.stat().st_mtime_ns) for p in folder.iterdir()} == before
 
 
+@pytest.mark.openfoam
 def test_links_in_the_place_of_files(home, tmp_path):
     """A whole run, and its report, with every file that they write a link to one of the user's."""
     case = make_case(tmp_path / "case", steps=2, write_every=2, transport="tcp", prepared=False, tight=False)
