@@ -130,6 +130,15 @@ bool Foam::flowState::writeData(Ostream& os) const
 }
 
 
+#if OPENFOAM >= 2006
+bool Foam::flowState::writeObject(IOstreamOption, const bool valid) const
+{
+    return regIOobject::writeObject
+    (
+        IOstreamOption(IOstreamOption::BINARY), valid
+    );
+}
+#else
 bool Foam::flowState::writeObject
 (
     IOstream::streamFormat,
@@ -143,3 +152,4 @@ bool Foam::flowState::writeObject
         IOstream::BINARY, version, IOstream::UNCOMPRESSED, valid
     );
 }
+#endif
