@@ -18,8 +18,9 @@ WITHOUT_OPTIONS = ("icoFoam", "dnsFoam")  # solvers that never look at fvOptions
 STEADY = ("simpleFoam", "porousSimpleFoam", "SRFSimpleFoam", "potentialFoam")
 WORDS = {  # what the plugin brings, by the dictionary that names it
     "constant/turbulenceProperties": ("constantViscosity",),
-    "system/fvSchemes": ("leanCubic",),
-    "system/fvSolution": ("periodicFFT",),
+    "system/fvSchemes": (
+        "leanCubic",
+    ),  # but not what fvSolution names: that is looked up at the first solution
 }
 ADVICE = f'functions {{ fibers {{ type fiberCoupling; libs ("lib{LIBRARY}.so"); }} }}'
 RESOLVED = 2.5  # Δx/η; k_max η = 1.5, usual for resolved turbulence, is 2.1 (Pope, Turbulent Flows, 2000, section 9.1)

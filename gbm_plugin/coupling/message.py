@@ -137,9 +137,9 @@ class Hello:
         )
 
 
-def decode_folder(data: bytes) -> str:
+def decode_folder(data: bytes | memoryview) -> str:
     """The name of a time folder, that of a processor before it or not; ProtocolError for any other place."""
-    folder = data.decode(errors="replace")
+    folder = bytes(data).decode(errors="replace")
     if not re.fullmatch(r"(processor\d+/)?-?\d+(\.\d+)?(e[-+]?\d+)?", folder, flags=re.ASCII):
         raise ProtocolError(f"{folder[:80]!r} is not a time folder")
     return folder

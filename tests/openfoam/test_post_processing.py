@@ -10,6 +10,7 @@ import pytest
 
 from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
+from gbm_plugin.report.paraview import line_mesh
 
 from conftest import gbm, make_case, run_case
 
@@ -70,8 +71,11 @@ def test_report_and_fiber_series(finished, recording):
     for name in ("energy.png", "spectrum.png", "end_to_end.png", "fibers.png", "flow.csv", "report.json"):
         assert (finished / "report" / name).stat().st_size > 100
     assert (finished / "report/fibers_wrapped.pvd").is_file()
-    unwrapped = sorted((finished / "report/unwrapped").glob("*.vtu"))
-    first, last = meshio.read(unwrapped[0]), meshio.read(unwrapped[-1])
+    pieces = len(list((finished / "report/unwrapped").glob("*.vtp")))
+    assert pieces == len(recording.times)
+    first, last = (line_mesh(recording, row, wrapped=False) for row in (0, pieces - 1))
+    last.write(finished / "last.vtu")
+    last = meshio.read(finished / "last.vtu")
     np.testing.assert_allclose(last.points, last_positions(recording), atol=1e-12)
     assert np.abs(last.points - first.points).max() > 0.01
     assert last.cells_dict["line"].shape == (5 * 5 + 3 * 3, 2)
