@@ -43,6 +43,11 @@ def sampling_word(case: Path | str) -> str:
     return Dictionary.read(Path(case), "constant/fiberProperties").word("interpolation", default="trilinear")
 
 
+def application(case: Path | str) -> str:
+    """The solver of the case."""
+    return Dictionary.read(Path(case), "system/controlDict").word("application")
+
+
 def make(
     case: Path,
     copy: Path,

@@ -10,6 +10,8 @@ from gbm_plugin.studies.paper import flow_one, flow_one_openfoam
 
 from conftest import DEFAULT_CASE
 
+pytestmark = pytest.mark.openfoam
+
 
 def test_it_begins_where_the_spectral_solver_is_and_continues(tmp_path):
     coarse = PRESETS["flow_I"].solver(cells=14, time_step=0.1)

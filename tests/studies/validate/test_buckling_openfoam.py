@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from gbm_plugin.studies.validate import buckling_openfoam
 
 from conftest import DEFAULT_CASE
+
+pytestmark = pytest.mark.openfoam
 
 
 def test_paths_converge_to_those_of_simulate():
@@ -14,9 +18,8 @@ def test_paths_converge_to_those_of_simulate():
     # cubic interpolation of fluxes and samples: the flow loses by their sixth order, paths follow it
     assert orders["velocity_error"] > 3 and orders["paths_error"] > 3, text
     assert result["rows"][1]["paths_error"] < 0.1, text
-    assert result["temporal_rows"][0]["paths_error"] < 0.2 * result["rows"][0]["paths_error"], (
-        text
-    )  # of the same mesh
+    # of the same mesh
+    assert result["temporal_rows"][0]["paths_error"] < 0.2 * result["rows"][0]["paths_error"], text
     held, analytic, apart = result["probability_rows"]
     assert held["tracks"] > 10 and analytic["tracks"] > 10, text
     assert abs(apart["probability"]) <= 4 * max(apart["standard_error"], 0.02), text
