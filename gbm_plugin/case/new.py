@@ -58,6 +58,7 @@ PRESETS = {
         "the same in seconds: fewer cells, a short time",
         {
             "system/blockMeshDict": {"n": 24},
+            "constant/transportProperties": {"nu": 0.02},
             "system/controlDict": {"endTime": 4, "writeInterval": 25},
         },
     ),
