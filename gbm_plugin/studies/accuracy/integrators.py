@@ -1,0 +1,105 @@
+"""Integrators: time of the fibers against their error, one sample of the flow a step
+
+Cost: processor time per bead and Kolmogorov time τ. The error includes that of extrapolating the flow over the step,
+which is the same for all; the reference takes steps eight times as short, implicitly, to a tolerance of 1e-6.
+`own limit` is ab3 with sub-steps at its stability limit instead of eq. (10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from itertools import product
+
+from ...fiber import ab3
+from .flows import Carrier, cellular, turbulent
+from .front import mark_front
+from .march import best, march
+
+REGIMES = {
+    "flexible": (0.1, 20, 100),
+    "l_p = L": (1.0, 10, 40),
+    "nearly rigid": (3.0, 10, 8),
+}  # l_p/L, N, fibers
+STEPS = (0.2, 0.1, 0.05)  # [τ]; the default case has 0.09
+TOLERANCES = (1e-2, 1e-3, 1e-4)
+DEFAULT = ("auto", 1e-3)
+MOST_WORK = {
+    "freeDrain": 3e8,
+    "rpy": 3e7,
+}  # bead-sub-steps of a run, a tenth when quick: what takes more is left out
+
+
+def methods() -> list[tuple[str, float | None]]:
+    """Integrator and tolerance of each."""
+    return [("ab3", None), ("ab3, own limit", None), *product(("implicit", "auto"), TOLERANCES)]
+
+
+@contextmanager
+def own_limit() -> Iterator[None]:
+    """ab3 takes its stability limit for eq. (10)."""
+    usual = ab3.stable_step
+
+    def stable(fibers, softness: float, tension: float) -> float:
+        stiffness = fibers.bending_stiffness.max() / (fibers.viscosity * (2 * fibers.radius) ** 4 * softness)
+        rate = ab3.BENDING_RATE * stiffness + ab3.TENSION_RATE * tension / (2 * fibers.radius)
+        return ab3.LIMIT / rate
+
+    ab3.stable_step = stable
+    try:
+        yield
+    finally:
+        ab3.stable_step = usual
+
+
+def measure(quick: bool) -> list[dict]:
+    """A row for each flow, regime, mobility, step and method."""
+    carriers, mobilities = ((cellular(),), ("freeDrain",)) if quick else (
+        (cellular(), turbulent()), ("freeDrain", "rpy")
+    )  # fmt: skip
+    steps, end = ((0.1,), 1.0) if quick else (STEPS, 3.0)
+    rows: list[dict] = []
+    for carrier, mobility, regime in product(carriers, mobilities, REGIMES):
+        rows += _regime(carrier, mobility, regime, steps, end, MOST_WORK[mobility] * (0.1 if quick else 1))
+    mark_front(rows, "flow", "regime", "mobility", "step")
+    return rows
+
+
+def _regime(carrier: Carrier, mobility: str, regime: str, steps, end: float, most: float) -> list[dict]:
+    persistence, beads, count = REGIMES[regime]
+    fibers = carrier.fibers(persistence, beads, count)
+    exact = march(
+        carrier, fibers, min(steps) / 8, end, mobility=mobility, integrator="implicit", tolerance=1e-6
+    )
+    # of eq. (10), in τ
+    substep = (
+        fibers.viscosity * (2 * fibers.radius) ** 4 / fibers.bending_stiffness[0]
+    ) / carrier.kolmogorov_time
+    work = count * beads * end / substep
+    rows = []
+    for step, (name, tolerance) in product(steps, methods()):
+        if name.startswith("ab3") and work > most:
+            continue
+        with own_limit() if name == "ab3, own limit" else nullcontext():
+            options = {"integrator": name.partition(",")[0], "tolerance": tolerance, "mobility": mobility}
+            outcome = best(carrier, fibers, step, end, **options)
+        row = {"flow": carrier.name, "regime": regime, "mobility": mobility, "step": step, "integrator": name}
+        row |= {"tolerance": tolerance, "sub_steps": step / substep, "seconds": outcome.seconds}
+        row |= {"microseconds": 1e6 * outcome.seconds / (count * beads * end)} | outcome.errors(exact)
+        rows.append(row | {"default": (name, tolerance) == DEFAULT})
+    return rows
+
+
+def lines(rows: list[dict]) -> list[str]:
+    """* marks the default, + the front."""
+    head = "flow         regime       mobility   step/τ sub-steps  integrator      tolerance   µs/bead/τ"
+    text = [head + "    ends/L      <R²>  curvature"]
+    for r in rows:
+        mark = "*" * r["default"] + "+" * r["on_front"]
+        tolerance = "" if r["tolerance"] is None else f"{r['tolerance']:g}"
+        text.append(
+            f"{r['flow']:12s} {r['regime']:12s} {r['mobility']:9s} {r['step']:7g} {r['sub_steps']:9.3g}  "
+            f"{r['integrator']:14s} {tolerance:>9s}{r['microseconds']:13.3g}{r['error']:10.1e}{r['r2_error']:10.1e}"
+            f"{r['curvature_error']:10.1e} {mark}"
+        )
+    return text
