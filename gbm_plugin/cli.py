@@ -20,7 +20,7 @@ from .signals import ASKS
 # what is said in one line: the rest is a fault of the program, with its traceback
 EXPECTED = (GbmError, ValueError, OSError, FloatingPointError, MemoryError)
 DONE, FAILED, USAGE, STOPPED = 0, 1, 2, 3
-COMMON = {"action", "command", "study", "csv", "figure", "json"}  # not of a study itself
+COMMON = {"action", "command", "study", "csv", "figure", "json", "save"}  # not of a study itself
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -220,6 +220,7 @@ def _add_studies(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
             sub.add_argument("--csv", metavar="FILE", help="also write the numbers, unrounded")
             sub.add_argument("--figure", metavar="PNG", help="also draw the result")
             _add_json(sub)
+            sub.add_argument("--save", metavar="NAME", help="all three: NAME.csv, NAME.json and NAME.png")
 
 
 def _study(arguments) -> dict | None:
@@ -231,6 +232,9 @@ def _study(arguments) -> dict | None:
         return None
     study = studies[arguments.study].load()
     options = {name: value for name, value in vars(arguments).items() if name not in COMMON}
+    if arguments.save:
+        arguments.csv, arguments.json = (arguments.save + end for end in (".csv", ".json"))
+        arguments.figure = arguments.save + ".png" if hasattr(study, "draw") else None
     if arguments.figure and not hasattr(study, "draw"):
         raise ValueError(f"--figure: the study {arguments.study} has no picture")
     result = study.run(**options)
