@@ -28,11 +28,13 @@ class FourierModes:
                 f"{tuple(map(int, cells))} cells cannot hold: more than twice as many are needed"
             )
         phase = np.exp(2j * np.pi * offset * (self.wavevectors / cells).sum(axis=1))
-        half = np.zeros((3, *cells), dtype=complex)
         index = tuple(self.wavevectors.T % cells[:, None])
+        out = np.empty((3, *cells))
         for component in range(3):
-            np.add.at(half[component], index, self.amplitudes[:, component] * phase)
-        return np.fft.ifftn(half, axes=(1, 2, 3)).real * cells.prod()
+            half = np.zeros(cells, dtype=complex)
+            np.add.at(half, index, self.amplitudes[:, component] * phase)
+            out[component] = np.fft.ifftn(half).real * cells.prod()
+        return out
 
     @property
     def kinetic_energy(self) -> float:

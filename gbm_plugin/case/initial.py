@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,32 +12,47 @@ import numpy as np
 from ..errors import CaseError
 from ..files import replaced
 from .dictionary import Dictionary
+from .earlier import read_earlier
 from .fields import FourierModes, abc, peaked_spectrum, random_modes, taylor_green_vortex
+
+log = logging.getLogger(__name__)
 
 END = f"// {73 * '*'} //"  # the last line of what OpenFOAM writes: the file is whole
 NOTE = "made from system/initialFieldDict"
-KINDS = ("random", "modes", "taylorGreenVortex", "ABC")
+KINDS = ("random", "modes", "taylorGreenVortex", "ABC", "run")
 
 
-def read_initial_field(case: Path) -> FourierModes:
-    """The modes that `system/initialFieldDict` describes. CaseError where an entry is wrong."""
+@dataclass(frozen=True)
+class InitialField:
+    """The velocity that a case begins with, and the state of its force where that is an earlier run's."""
+
+    modes: FourierModes
+    force: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def read_initial_field(case: Path) -> InitialField:
+    """What `system/initialFieldDict` describes. CaseError where an entry is wrong."""
     d = Dictionary.read(case, "system/initialFieldDict")
     kind = d.word("field", KINDS)
     try:
-        if kind == "random":
-            modes = _random(d)
+        if kind == "run":
+            earlier = read_earlier(case, d)
+            initial = InitialField(earlier.modes, earlier.force)
+            log.info("the flow begins as that of %s", earlier.path.parents[1].resolve())
+        elif kind == "random":
+            initial = InitialField(_random(d))
         elif kind == "taylorGreenVortex":
-            modes = taylor_green_vortex(d.number("velocity", 1.0))
+            initial = InitialField(taylor_green_vortex(d.number("velocity", 1.0)))
         elif kind == "ABC":
-            modes = abc(d.number("A", 1.0), d.number("B", 1.0), d.number("C", 1.0))
+            initial = InitialField(abc(d.number("A", 1.0), d.number("B", 1.0), d.number("C", 1.0)))
         else:
-            modes = _modes(d)
+            initial = InitialField(_modes(d))
     except CaseError:
         raise
     except ValueError as error:
         raise CaseError(f"{d.where}: {error}") from None
     d.done()
-    return modes
+    return initial
 
 
 def _random(d: Dictionary) -> FourierModes:

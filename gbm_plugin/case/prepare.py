@@ -105,7 +105,7 @@ def _initial_velocity(scene: Scene, template: Path, target: Path) -> None:
         raise CaseError(f"{dictionary} is there, and no {template} whose form its velocity could take")
     if scene.cells is None:
         raise CaseError(f"{dictionary} needs a mesh of one block of equal cells")
-    modes = read_initial_field(scene.case)
+    modes = read_initial_field(scene.case).modes
     try:
         field = modes.on_lattice(scene.cells, offset=0.5)
     except ValueError as error:

@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import check_arrays, read_arrays
+from ..case.dictionary import Dictionary
 from ..case.initial import read_initial_field
-from ..case.layout import flow_table, results
+from ..case.layout import FLOW_FILE, SPECTRAL, flow_table, results
 from ..case.scene import Forcing, Scene
 from ..case.times import choose_start
 from ..errors import CaseError, StateError
@@ -28,7 +29,6 @@ from .driver import COMPLETE, Carrier, Run, results_folder
 
 log = logging.getLogger(__name__)
 
-FLOW_FILE = "uniform/flow.npz"
 SMALL = 1 << 20  # arrays of so many bytes are read, whatever they are
 COLUMNS = (
     *("Time", "k", "epsilonBudget", "epsilonGradient", "epsilonLaplacian", "uPrime", "ReLambda", "eta"),
@@ -49,19 +49,20 @@ def run_spectral(
             f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of the "
             f"spectral solver's; allowed: {' '.join(WORDS)}"
         )
-    folder = results_folder(scene.case, "spectral")
+    folder = results_folder(scene.case, SPECTRAL)
     start = choose_start(
         folder, scene.start_time, scene.end_time, scene.time_step, fresh, makes_beginning=True
     )
     if start.complete:
         log.info(COMPLETE, start.time)
         return True
+    cycles = _sub_cycles(scene.case)
     solver = SpectralSolver(
         cells,
         scene.kinematic_viscosity,
         box=box,
         forcing=_forcing(scene.forcing),
-        time_step=scene.time_step,
+        time_step=scene.time_step / cycles,
         threads=threads,
         precision=precision,
         interpolation=scene.interpolation,
@@ -70,19 +71,33 @@ def run_spectral(
     if not start.continues:
         _set_initial(scene, solver)
     scene = replace(scene, case=folder)
-    return Run(scene, _SpectralFlow(scene, solver), start).to_the_end()
+    return Run(scene, _SpectralFlow(scene, solver, cycles), start).to_the_end()
 
 
 def _set_initial(scene: Scene, solver: SpectralSolver) -> None:
-    modes = read_initial_field(scene.case)
+    initial = read_initial_field(scene.case)
+    modes, force = initial.modes, initial.force
     if isinstance(solver.forcing, LinearForcing) and not np.any(modes.amplitudes):
         raise CaseError(
             f"{scene.case}/system/initialFieldDict: the forcing {scene.forcing.name} has nothing to force, k = 0"
         )
     try:
         solver.set_velocity(modes.on_lattice(scene.cells, offset=0.0))
+        if force and solver.forcing.forms():
+            solver.forcing.restore(force)
     except ValueError as error:
         raise CaseError(f"{scene.case}/system/initialFieldDict: {error}") from None
+
+
+def _sub_cycles(case: Path) -> int:
+    """Steps of the flow in one deltaT, of the fibers and of the coupling: fvSolution, spectral { nSubCycles n; }."""
+    solution = Dictionary.read(case, "system/fvSolution") if (case / "system/fvSolution").is_file() else None
+    if solution is None or "spectral" not in solution:
+        return 1
+    d = solution.sub("spectral")
+    cycles = d.integer("nSubCycles", 1, least=1)
+    d.done()
+    return cycles
 
 
 def _cube(scene: Scene) -> tuple[int, float]:
@@ -111,8 +126,8 @@ def _forcing(forcing: Forcing | None) -> LinearForcing | EswaranPope | None:
 class _SpectralFlow(Carrier):
     """The solver, and its table of energies."""
 
-    def __init__(self, scene: Scene, solver: SpectralSolver):
-        self.scene, self.solver = scene, solver
+    def __init__(self, scene: Scene, solver: SpectralSolver, cycles: int = 1):
+        self.scene, self.solver, self.cycles = scene, solver, cycles
         # energy and power before the last step, and at its end
         self.before: tuple[float, float] | None = None
         self.now: tuple[float, float] | None = None
@@ -131,7 +146,7 @@ class _SpectralFlow(Carrier):
         self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")
 
     def advance(self) -> None:
-        self.solver.advance(1)
+        self.solver.advance(self.cycles)
 
     def note(self, time: float) -> None:
         energy, power, dissipation = self.solver.energetics().values()

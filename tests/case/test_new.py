@@ -37,7 +37,9 @@ def test_a_folder_that_is_there_and_a_preset_that_is_not(tmp_path, capsys):
     with pytest.raises(CaseError, match="is there already"):
         new_case(tmp_path)
     assert main(["new", str(tmp_path / "c"), "--preset", "flow-2"]) == 1
-    assert "allowed: default quick boxFoam flow-I taylor-green" in capsys.readouterr().err
+    assert (
+        "allowed: default quick boxFoam flow-I flow-II-start flow-II taylor-green" in capsys.readouterr().err
+    )
     assert not (tmp_path / "c").exists()
 
 

@@ -164,7 +164,7 @@ def test_initial_field_kinds(case):
         ("field modes; modes (((0 1 0) (0 0 0) (-1 0 0)));", 0.25),  # sin(y)
     ):
         path.write_text(HEADER + text)
-        u = read_initial_field(case).on_lattice(cells)
+        u = read_initial_field(case).modes.on_lattice(cells)
         assert 0.5 * (u**2).sum(axis=0).mean() == pytest.approx(energy, rel=1e-12), text
 
 

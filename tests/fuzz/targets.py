@@ -12,7 +12,7 @@ from random import Random
 import h5py
 import numpy as np
 
-from gbm_plugin.case.layout import STATE_FILE
+from gbm_plugin.case.layout import FLOW_FILE, STATE_FILE
 from gbm_plugin.case.mesh import box_mesh
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.fleet.fleet import Fleet
@@ -20,7 +20,7 @@ from gbm_plugin.output.field import read_velocity
 from gbm_plugin.output.recording import FamilyRecord, Recorder, open_recording
 from gbm_plugin.output.tables import read_dat
 from gbm_plugin.report.paraview import polylines
-from gbm_plugin.run.spectral import FLOW_FILE, _SpectralFlow
+from gbm_plugin.run.spectral import _SpectralFlow
 from gbm_plugin.run.stored import SOURCE_FILE, _Stored
 from gbm_plugin.spectral import EswaranPope, SpectralSolver
 

@@ -231,7 +231,7 @@ def test_both_engines_in_one_realisation(tmp_path, application, time_scale, cell
         control.write_text(control.read_text().split("functions")[0])
         assert start_solver(path).wait() == 0, solver_log(path).read_text()[-2000:]
         if not solver.step:
-            start = read_initial_field(path).on_lattice((n,) * 3, offset=0.0)
+            start = read_initial_field(path).modes.on_lattice((n,) * 3, offset=0.0)
             solver.set_velocity(start)
             solver.advance(steps)
             assert np.std(solver.velocity - start) > np.std(start)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -115,6 +116,72 @@ def test_one_force_in_both_engines(tmp_path):
     largest = np.abs(spectral["power"]).max()
     np.testing.assert_allclose(openfoam["power"], spectral["power"], rtol=0, atol=0.05 * largest)
     assert len(report(path)["files"]) and report(path)["flow"]["time"] == pytest.approx([0, 0.1])
+
+
+FROM = 'field run; from "../whole";'
+
+
+def begun(path, **options):
+    """A finer case that begins from `whole`, under a force with a state."""
+    options = {"fv_options": ESWARAN_POPE, "initial": FROM, "steps": 2, "prepared": False} | options
+    return make_case(path, **options)
+
+
+def stored(path, time):
+    with np.load(path / f"spectral/{time}/uniform/flow.npz") as state:
+        return {name: state[name] for name in state.files}
+
+
+def test_a_run_begins_from_an_earlier_one(tmp_path):
+    """Its modes and its force, to rounding: the table of the finer run begins where that of the coarser ended."""
+    coarse = make_case(tmp_path / "whole", cells=16, steps=4, prepared=False, fv_options=ESWARAN_POPE)
+    run_case(coarse, *SPECTRAL)
+    fine = begun(tmp_path / "fine", cells=24)
+    run_case(fine, *SPECTRAL)
+    before, after = read_forcing(coarse / "spectral"), read_forcing(fine / "spectral")
+    assert after["Time"][0] == 0
+    for column in ("k", "power", "epsilonGradient"):
+        assert after[column][0] == pytest.approx(before[column][-1], rel=1e-12), column
+    # the force went on: as many draws as steps, and one for its first value
+    assert stored(fine, "0.04")["forcing_draws"] == stored(coarse, "0.08")["forcing_draws"] + 2
+
+
+@pytest.mark.openfoam
+def test_openfoam_begins_from_the_same_modes(tmp_path):
+    """At its centres of cells."""
+    coarse = make_case(tmp_path / "whole", cells=16, steps=4, prepared=False, fv_options=ESWARAN_POPE)
+    run_case(coarse, *SPECTRAL)
+    fine = begun(tmp_path / "fine", cells=24)
+    run_case(fine)
+    table = read_forcing(fine)
+    assert table["k"][0] == pytest.approx(read_forcing(coarse / "spectral")["k"][-1], rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    "initial, message",
+    [
+        ('field run; from "../nowhere";', "no time folder with a flow"),
+        (FROM + " time 0.07;", "is 0.07;.* has 0.2 0.4"),
+        (FROM, "the stored force has|has 24 x 24 x 24 cells.*must be as large"),
+    ],
+)
+def test_a_beginning_that_is_none_is_refused(whole, tmp_path, initial, message):
+    path = begun(whole.parent / tmp_path.name, cells=24, initial=initial.replace("whole", whole.name))
+    set_entry(path / "system/blockMeshDict", "width", "5")
+    done = gbm("run", path, *SPECTRAL)
+    assert done.returncode == 1 and re.search(message, done.stderr) and "Traceback" not in done.stderr
+
+
+def test_sub_cycles_are_steps_of_the_flow(tmp_path):
+    """Two steps of the flow in a deltaT are those of half of it, to the bit."""
+    short = make_case(tmp_path / "short", time_step=0.01, steps=20, prepared=False)
+    long = make_case(tmp_path / "long", time_step=0.02, steps=10, prepared=False)
+    solution = long / "system/fvSolution"
+    solution.write_text(solution.read_text() + "spectral { nSubCycles 2; }\n")
+    for path in (short, long):
+        run_case(path, *SPECTRAL)
+    one, two = (read_forcing(path / "spectral")["k"] for path in (short, long))
+    np.testing.assert_array_equal(one[::2], two)
 
 
 def test_a_gpu_that_is_not_there_is_named(tmp_path):
