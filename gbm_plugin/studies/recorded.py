@@ -168,7 +168,6 @@ class FinishedRun:
             )
         self.rows = rows[:: max(1, -(-len(rows) // records))]
         self.times = times[self.rows]
-        self.all_rows = rows
 
     @property
     def spacing(self) -> float:
