@@ -83,15 +83,16 @@ def make_case(
     initial: str | None = None,
     tight: bool = True,
     prepared: bool = True,
-    application: str | None = None,
+    application: str = "pimpleFoam",
+    viscosity: float = 0.01,
 ) -> Path:
     """A small copy of the default case: the same dictionaries, other numbers."""
     path.mkdir(parents=True)
     for folder in ("0.orig", "constant", "system"):
         shutil.copytree(DEFAULT_CASE / folder, path / folder, ignore=shutil.ignore_patterns("polyMesh"))
     control = path / "system/controlDict"
-    if application is not None:
-        set_entry(control, "application", application)
+    set_entry(control, "application", application)
+    set_entry(path / "constant/transportProperties", "nu", repr(viscosity))
     set_entry(control, "deltaT", repr(time_step))
     set_entry(control, "endTime", repr(steps * time_step))
     set_entry(control, "writeInterval", str(write_every))

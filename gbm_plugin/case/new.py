@@ -126,16 +126,17 @@ PRESETS = {
         {
             "system/blockMeshDict": {"n": 24},
             "constant/transportProperties": {"nu": 0.02},
-            "system/controlDict": {"endTime": 4, "writeInterval": 25},
+            "constant/fiberProperties": {"recordInterval": 5},
+            "system/controlDict": {"deltaT": 0.04, "endTime": 4, "writeInterval": 25},
         },
     ),
-    "boxFoam": Preset(
-        "the same by boxFoam, the solver made for the box: 64^3, sampled in sixth order, viscosity 0.007",
+    "pimpleFoam": Preset(
+        "the same by pimpleFoam, which takes any mesh of a periodic box: 40^3, viscosity 0.01",
         {
-            "system/blockMeshDict": {"n": 64},
-            "constant/transportProperties": {"nu": 0.007},
-            "constant/fiberProperties": {"interpolation": "quintic", "recordInterval": 10},
-            "system/controlDict": {"application": "boxFoam", "deltaT": 0.015, "writeInterval": 200},
+            "system/blockMeshDict": {"n": 40},
+            "constant/transportProperties": {"nu": 0.01},
+            "constant/fiberProperties": {"interpolation": "cubic", "recordInterval": 5},
+            "system/controlDict": {"application": "pimpleFoam", "deltaT": 0.04, "writeInterval": 75},
         },
     ),
     "flow-I": Preset(
@@ -144,7 +145,6 @@ PRESETS = {
             "system/blockMeshDict": {"n": 128},
             "constant/transportProperties": {"nu": 1e-3},
             "system/controlDict": {
-                "application": "boxFoam",
                 "deltaT": 0.01,
                 "endTime": 500,
                 "writeInterval": 2000,

@@ -23,7 +23,7 @@ def scene_copy(
     texts: Mapping[str, str],
     entries: Mapping[str, Mapping[str, object]] | None = None,
 ) -> Path:
-    """A copy of `case`, with its schemes and solver settings, that takes `steps` steps to end_time [s] on
+    """A copy of `case`, with its solver, schemes and settings, that takes `steps` steps to end_time [s] on
     cells^3 with a kinematic viscosity [m2/s]; writes every `write_every` steps. texts: {dictionary: content},
     replaced as a whole; entries: {dictionary: {entry: value}}, changed in place. Raises as `copy_case`."""
     time = {
@@ -37,7 +37,9 @@ def scene_copy(
         "system/blockMeshDict": {"n": cells},
         "constant/transportProperties": {"nu": viscosity},
     }
-    copy_case(Path(case), copy, changed | dict(entries or {}), texts)
+    for name, values in (entries or {}).items():
+        changed[name] = {**changed.get(name, {}), **values}
+    copy_case(Path(case), copy, changed, texts)
     return copy
 
 

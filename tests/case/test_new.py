@@ -22,6 +22,7 @@ def test_presets_have_their_own_numbers(tmp_path):
     flow = read_scene(new_case(tmp_path / "a", "flow-I"))
     assert flow.cells == (128, 128, 128) and flow.kinematic_viscosity == 1e-3
     assert flow.forcing.type == "eswaranPope" and flow.application == "boxFoam"
+    assert read_scene(new_case(tmp_path / "c", "pimpleFoam")).application == "pimpleFoam"
     assert read_scene(new_case(tmp_path / "b", "taylor-green")).forcing is None
 
 
@@ -30,7 +31,7 @@ def test_comments_and_everything_else_stay(tmp_path):
     ours = (SHIPPED / "system/controlDict").read_text().splitlines()
     theirs = (case / "system/controlDict").read_text().splitlines()
     changed = [a for a, b in zip(ours, theirs, strict=True) if a != b]
-    assert {line.split()[0] for line in changed} <= {"endTime", "writeInterval"}
+    assert {line.split()[0] for line in changed} <= {"deltaT", "endTime", "writeInterval"}
 
 
 def test_a_folder_that_is_there_and_a_preset_that_is_not(tmp_path, capsys):
@@ -38,7 +39,8 @@ def test_a_folder_that_is_there_and_a_preset_that_is_not(tmp_path, capsys):
         new_case(tmp_path)
     assert main(["new", str(tmp_path / "c"), "--preset", "flow-2"]) == 1
     assert (
-        "allowed: default quick boxFoam flow-I flow-II-start flow-II taylor-green" in capsys.readouterr().err
+        "allowed: default quick pimpleFoam flow-I flow-II-start flow-II taylor-green"
+        in capsys.readouterr().err
     )
     assert not (tmp_path / "c").exists()
 

@@ -29,8 +29,7 @@ def test_the_limit_of_stability(path, word, first):
     theta = np.linspace(0, np.pi, 2001)
     largest = sum(2 * a * np.sin(m * theta) for m, a in enumerate(first, start=1)).max()
     assert DIFFERENCES[word][1] == pytest.approx(0.7236 / largest, abs=0.006)
-    with (path / "system/fvSchemes").open("a") as file:
-        file.write(f"\nboxSchemes {{ differences {word}; }}\n")
+    set_entry(path / "system/fvSchemes", "differences", word)
     text = meaning(read_scene(path))
     assert f"boxFoam, {DIFFERENCES[word][0]} order in space" in text
     fastest = float(re.search(r"below (\S+) m/s", text).group(1))
@@ -38,10 +37,17 @@ def test_the_limit_of_stability(path, word, first):
 
 
 def test_a_word_that_it_does_not_have(path):
-    with (path / "system/fvSchemes").open("a") as file:
-        file.write("\nboxSchemes { differences central8; }\n")
+    set_entry(path / "system/fvSchemes", "differences", "central8")
     with pytest.raises(CaseError, match=r"central8.*central2 central4 central6"):
         meaning(read_scene(path))
+
+
+def test_what_the_choice_means(path):
+    set_entry(path / "system/controlDict", "application", "pimpleFoam")
+    assert "on any mesh; boxFoam solves this box" in meaning(read_scene(path))
+    mesh = path / "system/blockMeshDict"
+    mesh.write_text(mesh.read_text().replace("simpleGrading (1 1 1)", "simpleGrading (2 1 1)"))
+    assert meaning(read_scene(path)).endswith("on any mesh")
 
 
 def test_it_writes_its_modes(path):

@@ -8,7 +8,7 @@ import numpy as np
 
 from gbm_plugin.output.field import read_velocity
 
-from conftest import divide, make_case, solver_log, start_solver
+from conftest import divide, make_case, set_entry, solver_log, start_solver
 
 FIRST = {2: (1 / 2,), 4: (2 / 3, -1 / 12), 6: (3 / 4, -3 / 20, 1 / 60)}
 SECOND = {2: (1,), 4: (4 / 3, -1 / 12), 6: (3 / 2, -3 / 20, 1 / 90)}
@@ -35,13 +35,10 @@ def box_case(
 ) -> Path:
     """A case for boxFoam, written at its end only unless asked otherwise."""
     options = {"fv_options": NO_FORCE, "write_every": steps} | options
-    make_case(path, steps=steps, application="boxFoam", **options)
+    make_case(path, steps=steps, application="boxFoam", viscosity=nu, **options)
     control = path / "system/controlDict"
     control.write_text(control.read_text().split("functions")[0])
-    schemes = path / "system/fvSchemes"
-    schemes.write_text(schemes.read_text() + f"\nboxSchemes {{ differences central{order}; }}\n")
-    transport = path / "constant/transportProperties"
-    transport.write_text(transport.read_text().replace("0.01;", f"{nu!r};"))
+    set_entry(path / "system/fvSchemes", "differences", f"central{order}")
     if ranks > 1:
         divide(path, ranks, (1, 1, ranks))
     return path

@@ -1,7 +1,7 @@
 """The same fibers through OpenFOAM, with the cellular flow of section 3 held there, and in the analytic flow.
 
 The flow of eq. (12) fills the box 2π with W = π; its convection is the gradient of a pressure, and linearForcing
-balances viscosity with A = 2ν (2 sin(h/2)/h)², what the Laplacian of cells of width h makes of ν|k|² = 2ν.
+balances viscosity with what the solver's own second difference makes of ν|k|² = 2ν.
 The force lets the larger modes of the box grow at the rate ν, from rounding, so that νt must stay small; how far the
 velocity has moved at the end is reported. Fibers of the study `buckling`, same starts: their paths converge to those
 of `simulate` in the cells and in the step, and their buckling probability is that of the analytic flow within the
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import math
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...case.layout import results
+from ...case.solver import second_difference
 from ...fiber import Fibers, simulate
 from ...flow import TaylorGreen
 from ...output.field import read_velocity
@@ -155,7 +157,7 @@ def _solve(
         write_every=steps,
         texts={
             "system/initialFieldDict": FLOW,
-            "constant/fvOptions": FORCING.format(rate=_damping(cells)),
+            "constant/fvOptions": FORCING.format(rate=_damping(case, cells)),
             "constant/fiberProperties": FIBERS.format(**words),
         },
     )
@@ -167,10 +169,11 @@ def _solve(
         return {"velocity_error": found, "positions": np.asarray(recording.families["fibers"].positions)}
 
 
-def _damping(cells: int) -> float:
-    """[1/s] at which the second-order Laplacian on so many cells damps the flow."""
+def _damping(case: Path | str, cells: int) -> float:
+    """[1/s] at which the case's solver, on so many cells, damps the flow by viscosity."""
     h = 2 * WIDTH / cells
-    return float(2 * VISCOSITY * (2 * np.sin(h / 2) / h) ** 2)
+    coefficients = enumerate(second_difference(Path(case)), start=1)
+    return 2 * VISCOSITY * sum(2 * c * (1 - math.cos(m * h)) for m, c in coefficients) / h**2
 
 
 def _exact(cells: int) -> NDArray:

@@ -116,7 +116,7 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
         if copy == live:
             name = f"{start:.8g}"
             forcing = f"uniform/{read_scene(live).forcing.name}"
-            for part in ("U", "p", "phi", "U_0", "uniform/time", forcing):
+            for part in ("U", "p", "phi", "U_0", "uniform/time", "uniform/boxFoam", forcing):
                 target = live / name / part
                 target.parent.mkdir(parents=True, exist_ok=True)
                 if (before / name / part).is_file():

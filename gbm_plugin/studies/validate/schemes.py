@@ -1,4 +1,4 @@
-"""Which of OpenFOAM's schemes have the least error for their time.
+"""Which of pimpleFoam's schemes have the least error for their time.
 
 Around the schemes and correctors of a case, one after the other is changed, and some together. Every setting is of
 second order in mesh and step at best, so an error E at the cost C becomes E (C/C0)^(1/2) on the mesh that brings the
@@ -27,6 +27,7 @@ from . import comparison
 from .comparison import END_TIME, State
 
 SCHEMES, SOLUTION = "system/fvSchemes", "system/fvSolution"
+SOLVER = {"system/controlDict": {"application": "pimpleFoam"}}  # boxFoam has no such schemes
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,7 @@ class _Mesh:
     def _openfoam(self, setting: Setting, steps: int) -> tuple[State, float]:
         """The state at the end, and the solver's processor time for a step [s], without its start."""
         copy = self._copy()
-        comparison.make(self.case, copy, self.cells, steps, changes=setting.changes)
+        comparison.make(self.case, copy, self.cells, steps, changes=SOLVER | setting.changes)
         state = comparison.run(copy, self.cells, steps, "openfoam", setting.interpolation or self.word)
         times = re.findall(
             r"^ExecutionTime = (\S+) s",

@@ -1,12 +1,12 @@
-"""The default case with less accurate interpolations, whose order is known."""
+"""The default case as pimpleFoam runs it, and with less accurate interpolations, whose order is known."""
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 
-from conftest import DEFAULT_CASE, set_entry
+from gbm_plugin.case.new import new_case
+
+from conftest import set_entry
 
 LINEAR = {
     "div(phi,U)": "Gauss linear",
@@ -16,12 +16,16 @@ LINEAR = {
 
 
 @pytest.fixture(scope="session")
+def pimple_case(tmp_path_factory):
+    """The preset pimpleFoam; studies copy it."""
+    return new_case(tmp_path_factory.mktemp("pimple") / "case", "pimpleFoam")
+
+
+@pytest.fixture(scope="session")
 def second_order(tmp_path_factory):
-    """The default case with nothing but second-order schemes; studies copy it."""
-    tmp_path = tmp_path_factory.mktemp("second-order")
-    for part in ("0.orig", "constant", "system"):
-        shutil.copytree(DEFAULT_CASE / part, tmp_path / part, ignore=shutil.ignore_patterns("polyMesh"))
+    """The preset pimpleFoam with nothing but second-order schemes."""
+    case = new_case(tmp_path_factory.mktemp("second-order") / "case", "pimpleFoam")
     for name, scheme in LINEAR.items():
-        set_entry(tmp_path / "system/fvSchemes", name, scheme)
-    set_entry(tmp_path / "constant/fiberProperties", "interpolation", "trilinear")
-    return tmp_path
+        set_entry(case / "system/fvSchemes", name, scheme)
+    set_entry(case / "constant/fiberProperties", "interpolation", "trilinear")
+    return case

@@ -15,10 +15,10 @@ POWER = 0.05
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory):
+def result(tmp_path_factory, pimple_case):
     folder, turnovers = tmp_path_factory.mktemp("stationary"), 20
     jobs = [("openfoam", 12, 0.12), ("spectral", 16, 0.1)]
-    results = {job: stationary.solve(DEFAULT_CASE, folder, *job, turnovers, fibers=2) for job in jobs}
+    results = {job: stationary.solve(pimple_case, folder, *job, turnovers, fibers=2) for job in jobs}
     return stationary.compare(results, turnovers)
 
 
