@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import CaseError
 from ..fiber.model import Model, ModelError, entry_name
+from .beads import Fluid, read_beads
 from .dictionary import Dictionary
 from .mesh import Box, read_box
 from .positions import read_positions
@@ -69,6 +70,12 @@ class Forcing:
     name: str
     type: str
     values: dict[str, float | str]
+
+    @property
+    def dissipation(self) -> float | None:
+        """ε of the stationary state [m2/s3], where the forcing fixes it: the power of constantPower."""
+        power = self.values.get("power")
+        return float(power) if power else None
 
 
 @dataclass(frozen=True)
@@ -141,21 +148,24 @@ def read_scene(case: Path | str) -> Scene:
         )
     time_step = control.number("deltaT", above=0)
     fibers = Dictionary.read(case, "constant/fiberProperties")
+    density, viscosity = fibers.number("rho", 1.0, above=0), _read_viscosity(case)
+    forcing = _read_forcing(case)
+    fluid = Fluid(density, density * viscosity, forcing.dissipation if forcing else None)
     scene = Scene(
         case=case,
         application=_read_application(control),
-        kinematic_viscosity=_read_viscosity(case),
-        density=fibers.number("rho", 1.0, above=0),
+        kinematic_viscosity=viscosity,
+        density=density,
         time_step=time_step,
         start_time=control.number("startTime", 0.0),
         start_from=control.word("startFrom", START_FROM, "latestTime"),
         end_time=control.number("endTime"),
         write_interval=_write_interval(control, time_step),
-        forcing=_read_forcing(case),
+        forcing=forcing,
         interpolation=fibers.word("interpolation", default="trilinear"),
         record_interval=fibers.integer("recordInterval", 10, least=1),
         coupling=_read_coupling(fibers),
-        families=_read_families(case, fibers),
+        families=_read_families(case, fibers, fluid),
         **box_of(read_box(case)),
         texts=_texts(case),
     )
@@ -230,16 +240,16 @@ def _read_model(d: Dictionary, default: Model) -> Model:
         raise d.fail(entry_name(error.option), error.wrong) from None
 
 
-def _read_families(case: Path, fibers: Dictionary) -> tuple[Family, ...]:
+def _read_families(case: Path, fibers: Dictionary, fluid: Fluid) -> tuple[Family, ...]:
     model = _read_model(fibers, Model())
     group = fibers.sub("families")
-    families = tuple(_read_family(case, name, d, model) for name, d in group.subs().items())
+    families = tuple(_read_family(case, name, d, model, fluid) for name, d in group.subs().items())
     if not families:
         raise fibers.fail("families", "is empty: at least one family of fibers is needed")
     return families
 
 
-def _read_family(case: Path, name: str, d: Dictionary, model: Model) -> Family:
+def _read_family(case: Path, name: str, d: Dictionary, model: Model, fluid: Fluid) -> Family:
     model = _read_model(d, model)
     shape = d.word("shape", SHAPES, "straight")
     positions = None
@@ -249,7 +259,7 @@ def _read_family(case: Path, name: str, d: Dictionary, model: Model) -> Family:
         length = beads * float(np.linalg.norm(np.diff(positions, axis=1), axis=2).mean())
         seed = 0
     else:
-        count, beads = d.integer("count", least=1), d.integer("beads", least=2)
+        count, beads = d.integer("count", least=1), read_beads(d, model, fluid)
         seed = d.integer("seed", 1, least=0)
         length = _read_length(d, beads)
     stiffness = _read_stiffness(d, length / beads)

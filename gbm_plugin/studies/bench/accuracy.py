@@ -1,6 +1,6 @@
 """What an accuracy costs: every choice of a scene, its error beside its time.
 
-Each part measures one choice (--only names some): integrators. Errors are over the fiber length, times are processor
+Each part measures one choice (--only names some). Errors are over the fiber length, times are processor
 time of one thread, all ratios are of one run; * marks the default, + what nothing else beats in both.
 """
 
@@ -14,7 +14,7 @@ from types import ModuleType
 from ...fiber.threads import limited_to
 from ..study import option, steps
 
-PARTS = ("integrators",)
+PARTS = ("integrators", "beads", "mobility", "step")
 
 
 def _part(name: str) -> ModuleType:
