@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .fibers import end_to_end
 
+AXES = ("vorticity", "stretching", "middle", "compression")  # of the flow, that directions may lie along
+
 
 def directions(positions: ArrayLike) -> NDArray[np.float64]:
     """Unit vectors (..., 3) along the end-to-end vectors of fibers (..., N, 3)."""

@@ -21,6 +21,7 @@ from ...report.style import COLOURS, new_figure
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import end_to_end_squared_ratio
 from ...statistics.orientation import (
+    AXES,
     alignments,
     bead_rod_shape,
     directions,
@@ -37,7 +38,6 @@ SETTLED, SPHERES = 0.09, 1 / 6
 STRAIGHT = 0.99  # <R²>/L² of a rod
 SHORT, LONG = 10.0, 15.0  # L/η
 RANDOM_RODS = 100_000
-AXES = ("vorticity", "stretching", "middle", "compression")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

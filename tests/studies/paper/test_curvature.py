@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from known_runs import chains, record_run
-from known_runs import persistence as l_p
 
 from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.paper import curvature
+
+from known_runs import chains, record_run
+from known_runs import persistence as l_p
 
 TIMES = np.arange(60) * 0.5
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from known_runs import record_run, rods, unit
 
 from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.paper import end_to_end
+
+from known_runs import record_run, rods, unit
 
 TIMES = np.arange(30) * 0.5
 COUNT = 100

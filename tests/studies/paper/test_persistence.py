@@ -5,12 +5,13 @@ import json
 
 import numpy as np
 import pytest
-from known_runs import chains, record_run
-from known_runs import persistence as l_p
 
 from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.paper import persistence
+
+from known_runs import chains, record_run
+from known_runs import persistence as l_p
 
 GAMMA = 2.5
 TIMES = np.arange(40) * 0.5

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from known_runs import DISSIPATION, VISCOSITY, record_run, rods, unit
 
 from gbm_plugin.case.initial import write_velocity
 from gbm_plugin.case.mesh import read_box
@@ -14,6 +13,8 @@ from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.fields import fields_of
 from gbm_plugin.studies.paper import rods as study
 from gbm_plugin.studies.recorded import FinishedRun
+
+from known_runs import DISSIPATION, VISCOSITY, record_run, rods, unit
 
 SHIPPED = Path(__file__).parents[3] / "openfoam_case"
 RATE, CELLS = 0.7, 16
