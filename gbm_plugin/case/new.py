@@ -52,7 +52,7 @@ families    // d = 0.1 (3.5 eta), K^b from flexible to stiff, as in section 4 of
 }
 """
 
-# Flow II (epsilon 0.34, eta 0.0074) in a box of 4.1: lengths from 2 eta to half of the box, L/l_p from 0.3 to 25
+# Flow II (epsilon 0.34, eta 0.0074) in a box of 4.1: lengths from 2 eta to half of the box, L/l_p from 0.5 to 37
 _FLOW_TWO_FIBERS = """rho             1;
 
 mobility        freeDrain;
@@ -60,6 +60,13 @@ integrator      auto;
 tolerance       1e-4;
 interpolation   cubic;
 recordInterval  9;              // half a Kolmogorov time
+
+statistics
+{
+    from        3;              // [s]; a turnover is 0.83
+    interval    9;              // steps between samples
+    lags        150;            // samples that correlations reach
+}
 
 families
 {
@@ -75,12 +82,13 @@ RODS
 
 def _flow_two_fibers() -> str:
     grid = {
-        (2.0, 20): ("1e-3", "1e-4", "1e-5", "1e-6", "1e-7"),
-        (2.0, 40): ("1e-5", "1e-7", "1e-8"),
-        (1.0, 20): ("1e-3", "1e-4", "1e-5", "1e-6", "1e-7", "1e-8"),
-        (0.5, 20): ("1e-4", "1e-5", "1e-6", "1e-7", "1e-8"),
-        (0.25, 20): ("1e-6", "1e-7", "1e-8"),
-        (0.12, 20): ("1e-8",),
+        (2.0, 20): ("1e-2", "1e-3", "1e-4", "1e-5"),
+        (2.0, 40): ("1e-4", "1e-6"),
+        (1.0, 20): ("1e-3", "1e-4", "1e-5", "1e-6", "1.5e-7"),
+        (1.0, 40): ("1e-8",),
+        (0.5, 20): ("1e-3", "1e-4", "1e-5", "1e-6", "1e-7", "1e-8"),
+        (0.25, 20): ("1e-5", "1e-6", "1e-7", "1e-8", "1e-9"),
+        (0.12, 20): ("1e-7", "1e-9"),
         (0.06, 20): ("1e-9",),
     }
     seed, families = 0, []
@@ -88,10 +96,10 @@ def _flow_two_fibers() -> str:
         for stiffness in stiffnesses:
             seed += 1
             name = f"L{length:g}K{stiffness}" + ("" if beads == 20 else f"N{beads}")
-            families.append(_family(name, 100, beads, f"{length:g}", stiffness, seed))
-    rods = {2: "1e-8", 4: "2e-7", 8: "3e-6", 15: "3e-5", 30: "5e-4", 60: "8e-3"}  # L/l_p of 0.2
+            families.append(_family(name, 60, beads, f"{length:g}", stiffness, seed))
+    rods = {2: "1e-8", 4: "2e-7", 8: "3e-6", 15: "3e-5", 30: "5e-4", 60: "8e-3"}
     lines = [
-        _family(f"rod{n}", 100, 20, f"{n * 0.0074:.4g}", stiffness, 70 + n) for n, stiffness in rods.items()
+        _family(f"rod{n}", 100, 10, f"{n * 0.0074:.4g}", stiffness, 70 + n) for n, stiffness in rods.items()
     ]
     text = _FLOW_TWO_FIBERS.replace("FAMILIES", "\n".join(families))
     return text.replace("RODS", "\n".join(lines))

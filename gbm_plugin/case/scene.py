@@ -90,6 +90,16 @@ class Coupling:
 
 
 @dataclass(frozen=True)
+class Statistics:
+    """When statistics of the fibers are gathered: from a time [s] on, every `interval` steps; correlations up to so
+    many samples."""
+
+    since: float
+    interval: int
+    lags: int
+
+
+@dataclass(frozen=True)
 class Scene:
     """What both engines read of a case. SI units."""
 
@@ -107,6 +117,7 @@ class Scene:
     record_interval: int
     coupling: Coupling
     families: tuple[Family, ...]
+    statistics: Statistics | None = None
     box: tuple[float, float, float] | None = None
     origin: tuple[float, float, float] | None = None
     cells: tuple[int, int, int] | None = None
@@ -166,6 +177,7 @@ def read_scene(case: Path | str) -> Scene:
         record_interval=fibers.integer("recordInterval", 10, least=1),
         coupling=_read_coupling(fibers),
         families=_read_families(case, fibers, fluid),
+        statistics=_read_statistics(fibers),
         **box_of(read_box(case)),
         texts=_texts(case),
     )
@@ -308,6 +320,20 @@ def _read_coupling(fibers: Dictionary) -> Coupling:
         raise d.fail("port", f"is {coupling.port}; allowed: 0 (any free one) to 65535")
     d.done()
     return coupling
+
+
+def _read_statistics(fibers: Dictionary) -> Statistics | None:
+    """None where the dictionary does not ask for them: nothing is then computed."""
+    every = fibers.integer("recordInterval", 10, least=1)
+    if "statistics" not in fibers:
+        fibers.raw("statistics", None)
+        return None
+    d = fibers.sub("statistics")
+    statistics = Statistics(
+        d.number("from", 0.0), d.integer("interval", every, least=1), d.integer("lags", 100, least=0)
+    )
+    d.done()
+    return statistics
 
 
 def _read_forcing(case: Path) -> Forcing | None:

@@ -157,6 +157,7 @@ class Session:
             origin=hello.box_min,
             box=np.subtract(hello.box_max, hello.box_min),
             share=self.share,
+            state=find_state(self.scene.case, hello.folder),
         )
         welcome = encode_welcome(self.fleet.need, self.fleet.sizes)
         self.channel.send(Message(Kind.WELCOME, self.step, self.time, welcome))
@@ -250,7 +251,7 @@ class Session:
             if not self.journal.take(self.step, velocity, extra, self.sent_at, arrived_at):
                 continue
             if folder is not None:
-                self.fleet.save(folder, self.step, self.time)
+                self.journal.save(folder, self.step, self.time)
             return True
 
     def _check_step(self, message: Message, step: int, time: float) -> None:

@@ -17,6 +17,7 @@ from ..files import created
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
 from .fleet import GAP_WARNING, Fleet
+from .gathering import Gathering
 
 log = logging.getLogger(__name__)
 
@@ -26,10 +27,22 @@ class Journal:
 
     `fibers.h5` holds the positions of every `recordInterval`-th step, and of the first. `daemon.dat` has a row a
     step: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s], <R^2>/L^2 of each family.
+    `statistics.h5`, where it is asked for, has what `Gathering` gathers.
     """
 
-    def __init__(self, scene: Scene, fleet: Fleet, folder: Path, *, origin, box, share: Share = WHOLE):
-        """folder: of this start, where both files are made anew. origin, box (3,): of the flow's box [m]."""
+    def __init__(
+        self,
+        scene: Scene,
+        fleet: Fleet,
+        folder: Path,
+        *,
+        origin,
+        box,
+        share: Share = WHOLE,
+        state: Path | None = None,
+    ):
+        """folder: of this start, where the files are made anew. origin, box (3,): of the flow's box [m]. state: the
+        time folder that the fleet continues from."""
         self.scene, self.fleet = scene, fleet
         self._recorded = False
         self._folder, self._share = folder, share
@@ -46,6 +59,9 @@ class Journal:
             dictionaries=scene.texts,
             program_version=__version__,
         )
+        self.gathering = Gathering(scene, folder, share) if scene.statistics else None
+        if self.gathering and state is not None:
+            self.gathering.restore(state)
         self._path = keep_earlier(folder / daemon_table(share))
         self._table = created(self._path, buffering=1)
         names = ["Time", "step", "sentAt", "arrivedAt", "gap", *(f"R2_{f.name}" for f in scene.families)]
@@ -73,7 +89,16 @@ class Journal:
         if not self._recorded or step % self.scene.record_interval == 0:
             self.recorder.append(step, fleet.time, fleet.by_family)
             self._recorded = True
+        if self.gathering:
+            self.gathering.take(step, fleet.time, fleet.by_family)
         return True
+
+    def save(self, folder: Path, step: int, time: float) -> None:
+        """What a restart needs, into a time folder, which is complete with the last of it, the fibers' own state."""
+        if self.gathering:
+            self.gathering.save(folder)
+            self.gathering.write()
+        self.fleet.save(folder, step, time)
 
     def _note_prediction(self, step: int, wrong: float) -> None:
         """A warning the first time, and whenever it has doubled; the count comes at the end."""
@@ -112,6 +137,9 @@ class Journal:
                 f"of more than {100 * GAP_WARNING:.0f} % of its rms, up to {100 * self._worst:.0f} %: a shorter deltaT "
                 "would be wise"
             )
+        if self.gathering:
+            with contextlib.suppress(OSError):  # as below
+                self.gathering.write()
         self.recorder.close()
         if self._warnings is not None:
             self._warnings.close()

@@ -90,15 +90,20 @@ class Run:
                 f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written"
             )
         self.fleet = Fleet.seeded(scene, scene.origin, np.add(scene.origin, scene.box), start.time)
-        if start.continues:
+        folder = scene.case / _name(start.time) if start.continues else None
+        if folder:
             compare(scene)
-            folder = scene.case / _name(start.time)
             carrier.restore(folder, start.time)
             self.fleet.restore(folder)
             log.info("flow and fibers continue from %s", folder / STATE_FILE)
         name = _name(start.time)
         self.journal = Journal(
-            scene, self.fleet, results(scene.case) / name, origin=scene.origin, box=scene.box
+            scene,
+            self.fleet,
+            results(scene.case) / name,
+            origin=scene.origin,
+            box=scene.box,
+            state=folder,
         )
         carrier.open(name)
 
@@ -151,7 +156,7 @@ class Run:
         folder = self.scene.case / _name(time)
         write_velocity(self.template, folder / "U", self.carrier.on_cells(time))
         self.carrier.save(folder)
-        self.fleet.save(folder, self.step, time)
+        self.journal.save(folder, self.step, time)
 
 
 def _name(time: float) -> str:

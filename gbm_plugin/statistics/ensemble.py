@@ -43,16 +43,22 @@ def fiber_average(values: ArrayLike) -> Estimate:
         raise ValueError(f"values have shape {values.shape}; allowed is (T, F), none of them 0")
     if not np.isfinite(values).all():
         raise ValueError("values are not all finite")
-    of_series = time = of_fibers = None
+    return estimate(values.mean(axis=1), values.mean(axis=0))
+
+
+def estimate(series: ArrayLike, of_fibers: ArrayLike) -> Estimate:
+    """The average of which those over fibers at each time (T,) and over the time of each fiber (F,) are known."""
+    series, fibers = np.asarray(series, float), np.asarray(of_fibers, float)
+    of_series = time = spread = None
     try:
-        series = mean(values.mean(axis=1))
-        of_series, time = series.error, series.correlation_time
+        found = mean(series)
+        of_series, time = found.error, found.correlation_time
     except ValueError:
         pass
-    if values.shape[1] > 1:
-        of_fibers = float(values.mean(axis=0).std(ddof=1) / np.sqrt(values.shape[1]))
-    known = [e for e in (of_series, of_fibers) if e is not None]
-    return Estimate(float(values.mean()), max(known, default=None), of_series, of_fibers, time)
+    if len(fibers) > 1:
+        spread = float(fibers.std(ddof=1) / np.sqrt(len(fibers)))
+    known = [e for e in (of_series, spread) if e is not None]
+    return Estimate(float(series.mean()), max(known, default=None), of_series, spread, time)
 
 
 def correlation(values: ArrayLike, most: int) -> NDArray[np.float64]:
