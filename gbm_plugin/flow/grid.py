@@ -12,89 +12,127 @@ LEAST_BOUNDED = 4  # values in each direction of such a field
 
 
 @kernel
-def trilinear(fields, points, out):
-    """out (P, m) from fields (m, nx, ny, nz) at points (P, 3) in units of cells. Error O(h^2), continuous."""
-    _, nx, ny, nz = fields.shape
+def trilinear(nodes, points, out):
+    """out (P, m) from nodes (nx, ny, nz, m) at points (P, 3) in units of cells. Error O(h^2), continuous."""
+    nx, ny, nz, fields = nodes.shape
     for p in range(points.shape[0]):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
         a, b, c = x - i, y - j, z - k
         i0, j0, k0 = i % nx, j % ny, k % nz
         i1, j1, k1 = (i0 + 1) % nx, (j0 + 1) % ny, (k0 + 1) % nz
-        for m in range(fields.shape[0]):
-            f = fields[m]
-            near = (f[i0, j0, k0] * (1 - c) + f[i0, j0, k1] * c) * (1 - b)
-            near += (f[i0, j1, k0] * (1 - c) + f[i0, j1, k1] * c) * b
-            far = (f[i1, j0, k0] * (1 - c) + f[i1, j0, k1] * c) * (1 - b)
-            far += (f[i1, j1, k0] * (1 - c) + f[i1, j1, k1] * c) * b
+        for m in range(fields):
+            near = (nodes[i0, j0, k0, m] * (1 - c) + nodes[i0, j0, k1, m] * c) * (1 - b)
+            near += (nodes[i0, j1, k0, m] * (1 - c) + nodes[i0, j1, k1, m] * c) * b
+            far = (nodes[i1, j0, k0, m] * (1 - c) + nodes[i1, j0, k1, m] * c) * (1 - b)
+            far += (nodes[i1, j1, k0, m] * (1 - c) + nodes[i1, j1, k1, m] * c) * b
             out[p, m] = near * (1 - a) + far * a
 
 
 @part
-def _nearest(x, count, weights, slopes, nodes):
-    """The nearest of `count` periodic nodes around x, and Lagrange's weights of their values and slopes."""
-    width = weights.shape[0]
-    i = int(np.floor(x))
+def _nearest(x, count, scale, weights, places):
+    """The nearest periodic nodes around x, and Lagrange's weights of their values; scale: `_scale` of their number."""
+    width = scale.size
     below = width // 2 - 1
+    i = int(np.floor(x))
     s = x - i + below
+    left = right = 1.0
+    for q in range(width):
+        weights[q] = scale[q] * left
+        left *= s - q
+    for q in range(width - 1, -1, -1):
+        weights[q] *= right
+        right *= s - q
+    place = (i - below) % count
+    for q in range(width):
+        places[q] = place
+        place = place + 1 if place + 1 < count else 0
+
+
+@part
+def _slopes(x, slopes, scale):
+    """Lagrange's weights of the slope at x, for the nodes of `_nearest`."""
+    width = scale.size
+    s = x - np.floor(x) + width // 2 - 1
     for q in range(width):
         weight, slope = 1.0, 0.0
         for r in range(width):
             if r != q:
-                slope = (slope * (s - r) + weight) / (q - r)
-                weight = weight * (s - r) / (q - r)
-        weights[q], slopes[q] = weight, slope
-        nodes[q] = (i - below + q) % count
+                slope = slope * (s - r) + weight
+                weight = weight * (s - r)
+        slopes[q] = slope * scale[q]
 
 
 @kernel
-def lagrange(fields, points, width, out):
-    """As `trilinear`, with Lagrange polynomials through the `width` nearest nodes in each direction: error
-    O(h^width)."""
-    weights, slopes = np.empty((3, width)), np.empty((3, width))
-    nodes = np.empty((3, width), np.intp)
+def lagrange(nodes, points, scale, out):
+    """As `trilinear`, for m = 3, 6, ..., with Lagrange polynomials through the nearest nodes in each direction, as
+    many as `scale` has: error O(h^width)."""
+    nx, ny, nz, fields = nodes.shape
+    width = scale.size
+    weights, places = np.empty((3, width)), np.empty((3, width), np.intp)
     for p in range(points.shape[0]):
-        for d in range(3):
-            _nearest(points[p, d], fields.shape[1 + d], weights[d], slopes[d], nodes[d])
-        for m in range(fields.shape[0]):
-            total = 0.0
+        _nearest(points[p, 0], nx, scale, weights[0], places[0])
+        _nearest(points[p, 1], ny, scale, weights[1], places[1])
+        _nearest(points[p, 2], nz, scale, weights[2], places[2])
+        for m in range(0, fields, 3):
+            a = b = c = 0.0
             for i in range(width):
                 for j in range(width):
-                    row = fields[m, nodes[0, i], nodes[1, j]]
-                    line = 0.0
+                    row = nodes[places[0, i], places[1, j]]
+                    x = y = z = 0.0
                     for k in range(width):
-                        line += weights[2, k] * row[nodes[2, k]]
-                    total += weights[0, i] * weights[1, j] * line
-            out[p, m] = total
+                        node, weight = row[places[2, k]], weights[2, k]
+                        x += weight * node[m]
+                        y += weight * node[m + 1]
+                        z += weight * node[m + 2]
+                    weight = weights[0, i] * weights[1, j]
+                    a += weight * x
+                    b += weight * y
+                    c += weight * z
+            out[p, m], out[p, m + 1], out[p, m + 2] = a, b, c
+
+
+def _scale(word: str) -> NDArray:
+    """1/prod_{r != q} (q - r) of the nodes q = 0, 1, ... of a word of `LAGRANGE`."""
+    nodes = np.arange(LAGRANGE[word])
+    return np.array([1 / np.prod([q - r for r in nodes if r != q]) for q in nodes])
+
+
+def for_sampling(fields: NDArray) -> NDArray:
+    """The fields (m, nx, ny, nz) with all values of a node side by side in memory, where `on_grid` finds them with
+    least waiting; it takes others too, and then copies them in each call."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(fields, 0, -1)), -1, 0)
 
 
 def on_grid(word: str, fields: NDArray, points: NDArray) -> NDArray:
-    """Interpolate fields (m, nx, ny, nz), nodes at 0, 1, 2, ..., at points (P, 3) in units of cells, which
-    need not lie inside the box: (P, m)."""
-    out = np.empty((len(points), len(fields)))
+    """Interpolate fields (m, nx, ny, nz), best in the order of `for_sampling`, nodes at 0, 1, 2, ..., at points (P, 3)
+    in units of cells, which need not lie inside the box: (P, m). m is a multiple of 3, or the word is trilinear."""
+    out, nodes = np.empty((len(points), len(fields))), only_read(np.moveaxis(fields, 0, -1))
     if word == "trilinear":
-        trilinear(only_read(fields), only_read(points), out)
+        trilinear(nodes, only_read(points), out)
     else:
-        lagrange(only_read(fields), only_read(points), LAGRANGE[word], out)
+        lagrange(nodes, only_read(points), _scale(word), out)
     return out
 
 
 @kernel
-def _lagrange_slopes(fields, points, width, out):
+def _lagrange_slopes(nodes, points, scale, out):
     """out (P, m, 3): derivatives of the interpolant of `lagrange` in units of cells."""
+    width = scale.size
     weights, slopes = np.empty((3, width)), np.empty((3, width))
-    nodes = np.empty((3, width), np.intp)
+    places = np.empty((3, width), np.intp)
     for p in range(points.shape[0]):
         for d in range(3):
-            _nearest(points[p, d], fields.shape[1 + d], weights[d], slopes[d], nodes[d])
-        for m in range(fields.shape[0]):
+            _nearest(points[p, d], nodes.shape[d], scale, weights[d], places[d])
+            _slopes(points[p, d], slopes[d], scale)
+        for m in range(nodes.shape[3]):
             dx = dy = dz = 0.0
             for i in range(width):
                 for j in range(width):
-                    row = fields[m, nodes[0, i], nodes[1, j]]
+                    row = nodes[places[0, i], places[1, j]]
                     line = slope = 0.0
                     for k in range(width):
-                        value = row[nodes[2, k]]
+                        value = row[places[2, k], m]
                         line += weights[2, k] * value
                         slope += slopes[2, k] * value
                     dx += slopes[0, i] * weights[1, j] * line
@@ -107,7 +145,8 @@ def lagrange_gradient(word: str, velocity: NDArray, points: NDArray, spacing: ND
     """du_i/dx_j (P, 3, 3) of the interpolant of a velocity (3, nx, ny, nz), points as in `on_grid`, by a word of
     `LAGRANGE`. One order below that of the velocity."""
     out = np.empty((len(points), 3, 3))
-    _lagrange_slopes(only_read(velocity), only_read(points), LAGRANGE[word], out)
+    nodes = only_read(np.moveaxis(velocity, 0, -1))
+    _lagrange_slopes(nodes, only_read(points), _scale(word), out)
     return out / spacing
 
 

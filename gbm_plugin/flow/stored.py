@@ -169,9 +169,9 @@ class StoredFlow:
         kept = self._fields.setdefault(number, {})
         if "velocity" not in kept:
             velocity = self._velocity(number)
-            kept["velocity"] = velocity if self.periodic else grid.extended(velocity)
+            kept["velocity"] = grid.for_sampling(velocity if self.periodic else grid.extended(velocity))
         if name not in kept:
-            kept[name] = getattr(grid, name)(kept["velocity"], self.box / self._cells)
+            kept[name] = grid.for_sampling(getattr(grid, name)(kept["velocity"], self.box / self._cells))
         return kept[name]
 
     def _velocity(self, number: int) -> NDArray:

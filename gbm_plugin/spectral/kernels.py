@@ -58,9 +58,9 @@ def split(planes, first, out):
     """Write the plane pairs to fields out (m <= 3, n, n, n), from x = first on."""
     for pair in range(planes.shape[0]):
         x = first + 2 * pair
-        for c in range(out.shape[0]):
-            for j in range(out.shape[2]):
-                for m in range(out.shape[3]):
+        for j in range(out.shape[2]):
+            for m in range(out.shape[3]):
+                for c in range(out.shape[0]):
                     out[c, x, j, m] = planes[pair, c, j, m].real
                     out[c, x + 1, j, m] = planes[pair, c, j, m].imag
 

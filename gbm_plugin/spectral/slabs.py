@@ -70,7 +70,8 @@ class Slabs(Arrays):
 
     def to_physical(self, modes, out=None):
         n = self.modes.cells
-        out = np.empty((len(modes), n, n, n), self.real) if out is None else out
+        if out is None:  # in the order of flow.grid.for_sampling
+            out = np.moveaxis(np.empty((n, n, n, len(modes)), self.real), -1, 0)
         for first in range(0, len(modes), 3):
             part = out[first : first + 3]
 

@@ -101,7 +101,8 @@ class SpectralSolver:
         """Velocity (3, n, n, n) at ((i, j, k) + fraction) box/n: 1/2 for the centres of the cells between nodes."""
         i, j, k = (np.exp(1j * axis * fraction * self.box / self.cells) for axis in self.modes.k)
         modes = self.operators.xp.asarray(self.coefficients * (i * j * k))
-        return self.operators.host(self.operators.to_physical(modes.astype(self._u.dtype)))
+        u = self.operators.to_physical(modes.astype(self._u.dtype))
+        return np.ascontiguousarray(self.operators.host(u))
 
     @property
     def coefficients(self) -> NDArray:
