@@ -4,7 +4,6 @@ request, with all that is needed to continue written."""
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import logging
 import os
@@ -123,9 +122,18 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         help="which daemon this is, 1 ... daemons, of several that share the fibers",
     )
 
-    sub = add("report", _report, "Write figures, tables and ParaView files of a run into CASE/report.")
+    sub = add(
+        "report", _report, "Write figures, tables, ParaView files and a page of a run into CASE/report."
+    )
     add_case(sub)
     _add_json(sub)
+    sub.add_argument(
+        "--film", action="store_true", help="only a film: report/film/*.png, film.mp4 where ffmpeg is"
+    )
+    sub.add_argument("--frames", type=int, default=60, help="of the film (default: 60)")
+    sub.add_argument("--from", dest="since", type=float, metavar="T", help="start of the film [s]")
+    sub.add_argument("--families", nargs="+", default=["*"], metavar="PATTERN", help="that the film shows")
+    sub.add_argument("--fibers", type=int, metavar="N", help="of each family in the film")
 
     sub = add("info", _info, "Say what a case contains and whether the fiber model holds in it. SI units.")
     add_case(sub)
@@ -178,18 +186,43 @@ def _daemon(arguments) -> None:
     serve(arguments.case, arguments.share)
 
 
-def _report(arguments) -> dict:
+def _film(arguments) -> None:
+    from .case.layout import results
+    from .case.mesh import read_box
+    from .case.trust import check_case
+    from .output.recording import open_recording
+    from .report.film import write_film
+    from .studies.study import steps
+
+    case = Path(arguments.case)
+    check_case(case)
+    mesh = read_box(case)
+    words = {name: getattr(arguments, name) for name in ("frames", "families", "fibers", "since")}
+    with open_recording(results(case)) as recording:
+        written = write_film(recording, case, mesh and mesh.cells, progress=steps, **words)
+    last = written[-1]
+    print(f"{len([p for p in written if p.suffix == '.png'])} frames in {written[0].parent}")
+    print(f"film: {last}" if last.suffix == ".mp4" else "no film.mp4: ffmpeg is not installed")
+
+
+def _report(arguments) -> dict | None:
+    if arguments.film:
+        _film(arguments)
+        return None
     from .report.report import report
     from .report.summary import summary
+    from .studies.page import make_page
 
     result = report(Path(arguments.case))
-    print("\n".join(summary(arguments.case)))
+    averages = summary(arguments.case)
+    print("\n".join(averages))
     folder = Path(arguments.case) / "report"
     print(f"written to {folder}: {' '.join(result['files'])}")
     for change in result["changes"]:
         print(f"changed at t = {change['time']:g} (dotted in the figures): {', '.join(change['changes'])}")
     for reason in result["not_drawn"]:
         print(f"not drawn: {reason}")
+    print(f"all on one page: {make_page(Path(arguments.case), result, averages)}")
     return result
 
 
@@ -224,7 +257,7 @@ def _add_studies(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
 
 
 def _study(arguments) -> dict | None:
-    from .studies.study import find_studies, listing
+    from .studies.study import draw, find_studies, listing, write, write_csv
 
     studies = find_studies()
     if arguments.study is None:
@@ -232,24 +265,16 @@ def _study(arguments) -> dict | None:
         return None
     study = studies[arguments.study].load()
     options = {name: value for name, value in vars(arguments).items() if name not in COMMON}
-    if arguments.save:
-        arguments.csv, arguments.json = (arguments.save + end for end in (".csv", ".json"))
-        arguments.figure = arguments.save + ".png" if hasattr(study, "draw") else None
     if arguments.figure and not hasattr(study, "draw"):
         raise ValueError(f"--figure: the study {arguments.study} has no picture")
     result = study.run(**options)
     print(study.table(result))
     if arguments.csv:
-        with open(arguments.csv, "w", newline="") as file:
-            rows = study.rows(result)
-            writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_csv(study, result, arguments.csv)
     if arguments.figure:
-        from .report.style import styled
-
-        with styled():
-            study.draw(result).savefig(arguments.figure)
+        draw(study, result, arguments.figure)
+    if arguments.save:
+        write(study, result, arguments.save)
     return result
 
 

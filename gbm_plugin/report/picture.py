@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -11,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, interp1d
 
-from ..output.recording import Recording
+from ..output.recording import RecordedFamily, Recording
 from .paraview import bead_curvature, cut_at_faces
 from .style import new_figure
 
@@ -49,14 +53,41 @@ class Camera:
         return flat * magnification[..., None], near
 
 
-def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | None = None) -> Figure:
-    """Draw all families at the `row`-th time, wrapped into the box.
+@dataclass(frozen=True)
+class Choice:
+    """What of a recording is drawn: families by patterns of their names, fibers of each, and, in a film, the largest
+    curvature [1/m] of each family's colours, by its name, and that of the flow's."""
+
+    families: Sequence[str] = ("*",)
+    fibers: int | None = None
+    curvatures: Mapping[str, float] = field(default_factory=dict)
+    flow: float | None = None
+
+    def of(self, recording: Recording) -> list[RecordedFamily]:
+        """The families that are drawn. ValueError where no name matches."""
+        found = [f for f in recording.families.values() if any(fnmatch(f.name, p) for p in self.families)]
+        if not found:
+            names = " ".join(recording.families)
+            raise ValueError(f"no family is named {' '.join(self.families)}; there are {names}")
+        return found[: len(_HUES)]
+
+
+def largest_curvature(positions: NDArray, radius: float) -> float:
+    """Where a scale of colours ends [1/m], for fibers (..., N, 3): what few beads are beyond."""
+    return max(float(np.percentile(bead_curvature(positions, radius), 98)), 1e-3 / radius)
+
+
+def fibers_picture(
+    recording: Recording, row: int, flow: tuple[NDArray, str] | None = None, choice: Choice | None = None
+) -> Figure:
+    """Draw all families at the `row`-th time, or what is chosen, wrapped into the box.
 
     Fibers have their true thickness 2a where that is visible; colour is the curvature of eq. (5), a hue per
     family. flow: values (nx, ny, nz) at the cell centres and their label, shown on the faces behind.
     """
     origin, size = recording.box_origin, recording.box_size
-    families = list(recording.families.values())[: len(_HUES)]
+    choice = choice or Choice()
+    families = choice.of(recording)
     camera = Camera(origin, size)
     figure = new_figure(8.2, 6.4)
     grid = figure.add_gridspec(
@@ -72,16 +103,18 @@ def fibers_picture(recording: Recording, row: int, flow: tuple[NDArray, str] | N
     shapes, mappables, bars = [], [], []
     for number, family in enumerate(families):
         positions = family.positions[row]
-        shown = min(family.count, max(_MOST_FIBERS // len(families), 1))
+        shown = min(family.count, choice.fibers or max(_MOST_FIBERS // len(families), 1))
         kappa = bead_curvature(positions, family.radius)
         colours = LinearSegmentedColormap.from_list(family.name, _HUES[number % len(_HUES)])
-        scale = Normalize(0, max(np.percentile(kappa, 98), 1e-3 / family.radius), clip=True)
+        top = choice.curvatures.get(family.name) or largest_curvature(positions, family.radius)
+        scale = Normalize(0, top, clip=True)
         mappables.append(ScalarMappable(scale, colours))
         shapes.append((family.radius, positions[:shown], kappa[:shown]))
         label = f"{family.name}\n{shown} of {family.count} fibers"
         bars.append(_bar(figure, grid[number, 1], mappables[-1], label, extend="max"))
     if flow is not None:
-        _bar(figure, grid[-1, 1], _draw_faces(axes, camera, origin, size, flow[0]), flow[1])
+        faces = _draw_faces(axes, camera, origin, size, flow[0], choice.flow)
+        _bar(figure, grid[-1, 1], faces, flow[1])
     title = f"t = {recording.times[row]:g} s,  colour: curvature [1/m]"
     if len(families) < len(recording.families):
         title += f",  {len(families)} of {len(recording.families)} families"
@@ -180,13 +213,15 @@ def _draw_strokes(axes: Axes, strokes: list, points_per_metre: float, size: NDAr
     )
 
 
-def _draw_faces(axes: Axes, camera: Camera, origin: NDArray, size: NDArray, values: NDArray):
+def _draw_faces(
+    axes: Axes, camera: Camera, origin: NDArray, size: NDArray, values: NDArray, top: float | None
+):
     """The field on the three faces that look towards the camera from behind the fibers."""
     nodes = values
     for axis in range(3):  # from cell centres to nodes, periodically
         nodes = 0.5 * (nodes + np.roll(nodes, 1, axis))
         nodes = np.concatenate([nodes, np.take(nodes, [0], axis)], axis)
-    scale = Normalize(0, np.percentile(nodes, 99.5))
+    scale = Normalize(0, top or np.percentile(nodes, 99.5))
     for axis in range(3):
         side = 0 if camera.towards[axis] > 0 else -1
         face = np.take(nodes, side, axis)

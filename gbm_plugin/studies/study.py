@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import inspect
+import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -24,6 +26,8 @@ from types import ModuleType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from ..report.style import styled
 
 GROUPS = {
     "validate": "The coupling and its engines judged: by each other, by analytic flows, by averages",
@@ -104,3 +108,30 @@ def steps(work: Iterable, total: int, title: str) -> Iterator:
         for item in work:
             yield item
             bar.advance(task)
+
+
+def write(study: ModuleType, result: dict, name: Path | str) -> list[Path]:
+    """NAME.csv, NAME.json and, of a study that draws, NAME.png; returns those written."""
+    ends = (".csv", ".json", ".png") if hasattr(study, "draw") else (".csv", ".json")
+    paths = {end: Path(f"{name}{end}") for end in ends}
+    paths[".csv"].parent.mkdir(parents=True, exist_ok=True)
+    write_csv(study, result, paths[".csv"])
+    paths[".json"].write_text(json.dumps(result, indent=2) + "\n")
+    if ".png" in paths:
+        draw(study, result, paths[".png"])
+    return list(paths.values())
+
+
+def write_csv(study: ModuleType, result: dict, path: Path | str) -> None:
+    """The rows of a result, unrounded; a column for every name in them."""
+    with open(path, "w", newline="") as file:
+        rows = study.rows(result)
+        writer = csv.DictWriter(file, list(dict.fromkeys(name for row in rows for name in row)))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def draw(study: ModuleType, result: dict, path: Path | str) -> None:
+    """The figure of a result."""
+    with styled():
+        study.draw(result).savefig(path)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.paper import curvature
 
@@ -60,9 +59,3 @@ def test_beads_and_method(case):
     method = {r["family"]: r["distance"] for r in result["method"]}
     assert set(method) == {"N40", "N40_ab3"}
     assert max(method.values()) == pytest.approx(0.1, rel=0.15)
-
-
-def test_figure(case, tmp_path, capsys):
-    assert main(["study", "curvature", str(case), "--save", str(tmp_path / "c")]) == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.csv", "c.json", "c.png"]
-    assert "figure 9, " in capsys.readouterr().out

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.statistics.orientation import alignments, anisotropy, rod_tumbling
 from gbm_plugin.studies.paper import dynamics, shapes
@@ -104,9 +103,3 @@ def test_alignments_and_jeffery():
     shear[0, 1] = 2.0
     np.testing.assert_allclose(rod_tumbling(shear, np.array([0, 1.0, 0])), [2, 0, 0])  # thin, across: γ̇
     np.testing.assert_allclose(rod_tumbling(shear, np.array([0, 1.0, 0]), 0.0), [1, 0, 0])  # a sphere: γ̇/2
-
-
-@pytest.mark.parametrize("name", ["dynamics", "shapes"])
-def test_figures(case, tmp_path, name):
-    assert main(["study", name, str(case), "--save", str(tmp_path / "f")]) == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["f.csv", "f.json", "f.png"]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.paper import end_to_end
 
@@ -67,9 +66,3 @@ def test_slopes(result):
     assert slopes["K^b = 1"]["slope"] == pytest.approx(2, abs=1e-9)
     assert slopes["K^b = 1e-05"]["slope"] == pytest.approx(1, abs=0.05)
     assert slopes["K^b = 1e-05"]["error"] < 0.05
-
-
-def test_figure(case, tmp_path, capsys):
-    assert main(["study", "end-to-end", str(case), "--save", str(tmp_path / "e")]) == 0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["e.csv", "e.json", "e.png"]
-    assert "slope of ln⟨R²⟩" in capsys.readouterr().out
