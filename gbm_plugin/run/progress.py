@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 
 TAIL = 4096  # bytes of a table that surely hold its last row
 QUIET = 60.0  # between lines where there is no terminal [s]
+NAMED = 4  # families in a line
 BAR_WIDTH = 14  # columns: the rest of 80 is for what happens
 
 
@@ -53,15 +54,22 @@ class Progress:
         fibers = newest_row(self._case, f"{FIBERS}/*/daemon*.dat")
         time = fibers.get("Time", flow.get("Time", self._start))
         parts = [f"Re_λ {flow['ReLambda']:.3g}"] if "ReLambda" in flow else []
-        ratios = [f"{n.removeprefix('R2_')} {r:.3f}" for n, r in fibers.items() if n.startswith("R2_")]
+        ratios = {n.removeprefix("R2_"): r for n, r in fibers.items() if n.startswith("R2_")}
         if ratios:
-            parts.append(f"⟨R²⟩/L² {' '.join(ratios)}")
+            parts.append(f"⟨R²⟩/L² {_words(ratios)}")
         state = "  ".join(parts)
         if self._bar.disable:
             self._said = clock.monotonic()
             log.info("t = %g of %g s  %s", time, self._end, state)
         else:
             self._bar.update(self._task, completed=time - self._start, now=f"{time:g}", state=state)
+
+
+def _words(ratios: dict[str, float]) -> str:
+    """One number for each family, or where there are many the range that they span."""
+    if len(ratios) > NAMED:
+        return f"{min(ratios.values()):.3f} to {max(ratios.values()):.3f} in {len(ratios)} families"
+    return " ".join(f"{name} {ratio:.3f}" for name, ratio in ratios.items())
 
 
 def newest_row(case: Path, pattern: str) -> dict[str, float]:
