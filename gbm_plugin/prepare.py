@@ -17,7 +17,7 @@ from .spectral.interpolation import WORDS
 def prepare() -> None:
     """Small runs with every word."""
     for integrator, mobility in itertools.product(("ab3", "implicit"), MOBILITIES):
-        prepare_fibers(integrator=integrator, mobility=mobility)
+        prepare_fibers(True, integrator=integrator, mobility=mobility)
     prepare_fibers(mobility="rpy", strain_coupling=True, repulsion=1.0)
     fibers = Fibers.straight(1, 3, 1.0, 1.0, 1.0)
     for mobility in MOBILITIES:
@@ -31,6 +31,7 @@ def _prepare_grid() -> None:
     field, points, spacing = np.zeros((3, 4, 4, 4)), np.zeros((1, 3)), np.ones(3)
     for word in grid.WORDS:
         grid.on_grid(word, field, points)
+        grid.spread(word, np.zeros((1, 6)), points, (4, 4, 4))
     grid.lagrange_gradient("cubic", field, points, spacing)
     grid.rotation(field, spacing)
     grid.gradient(field, spacing)

@@ -87,6 +87,7 @@ class Coupling:
     host: str = "127.0.0.1"
     port: int = 0
     daemons: int = 1  # that share the fibers
+    feedback: bool = False  # whether fibers act on the flow
 
 
 @dataclass(frozen=True)
@@ -311,6 +312,7 @@ def _read_coupling(fibers: Dictionary) -> Coupling:
         host=d.word("host", default="127.0.0.1"),
         port=d.integer("port", 0, least=0),
         daemons=d.integer("daemons", 1, least=1),
+        feedback=d.switch("feedback", False),
     )
     if coupling.port and coupling.daemons > 1:
         raise d.fail(

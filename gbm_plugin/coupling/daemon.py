@@ -57,6 +57,11 @@ def serve(case: Path | str, number: int | None = None) -> None:
     case = Path(case).resolve()
     scene = read_scene(case)
     check_case(case)
+    if scene.coupling.feedback:
+        raise CaseError(
+            f"{case}/constant/fiberProperties: feedback is yes, which OpenFOAM's side cannot do yet; gbm run CASE "
+            "--flow spectral can"
+        )
     share = _share(scene, number)
     scene = scene.part(share)
     stop = Asked()
@@ -148,7 +153,7 @@ class Session:
         self.step, self.time = first.step, first.time
         self.time_step = hello.time_step
         with _patience(self.channel, first):
-            prepare_kernels(self.scene.families)
+            prepare_kernels(self.scene.families, self.scene.coupling.feedback)
             self.fleet = self._fibers(hello)
         self.journal = Journal(
             self.scene,

@@ -8,12 +8,14 @@ if TYPE_CHECKING:
     from .group import Group
     from .preparation import prepare
     from .rates import instant_rates
+    from .reaction import Reaction
     from .stepper import Stepper, merged_states
     from .trajectory import Trajectory, simulate
 
 __all__ = [
     "Fibers",
     "Group",
+    "Reaction",
     "Stepper",
     "Trajectory",
     "instant_rates",
@@ -25,6 +27,7 @@ __all__ = [
 _HOMES = {
     "Fibers": "fibers",
     "Group": "group",
+    "Reaction": "reaction",
     "Stepper": "stepper",
     "merged_states": "stepper",
     "instant_rates": "rates",

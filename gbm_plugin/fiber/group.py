@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sampling import NEEDS, rotation_of
+from .reaction import Reaction
 from .stepper import Stepper
 
 
@@ -61,6 +62,12 @@ class Group:
         extras = [None] * len(velocities) if extra is None else self.split(np.asarray(extra))
         for stepper, own, other in zip(self.steppers, velocities, extras, strict=True):
             stepper.observe(time, own, _needed(stepper.need, other))
+
+    def reaction(self, time_step: float) -> Reaction:
+        """Forces and torques (B, 3) on the fluid at the newest sample, and the powers of all; as that of Stepper."""
+        parts = [s.reaction(time_step) for s in self.steppers]
+        force, torque = (np.concatenate([p[k].reshape(-1, 3) for p in parts]) for k in (0, 1))
+        return Reaction(force, torque, sum(p.bending for p in parts), sum(p.friction for p in parts))
 
     def advance(self, time_step: float) -> None:
         """All by one step."""

@@ -10,8 +10,8 @@ from .fibers import Fibers
 from .stepper import Stepper
 
 
-def prepare(**options: Any) -> None:
-    """Move one small fiber with these options of a Stepper, by all that runs call."""
+def prepare(feedback: bool = False, **options: Any) -> None:
+    """Move one small fiber with these options of a Stepper, by all that runs call; feedback: its forces too."""
     fibers = Fibers.straight(1, 3, 1.0, 1.0, 1.0)
     stepper = Stepper(fibers, 0.0, **options)
     extra = np.zeros((1, 3, 3, 3) if stepper.need == "gradient" else (1, 3, 3))
@@ -26,4 +26,6 @@ def prepare(**options: Any) -> None:
         stepper.correct()
         observe()
     stepper.prediction_gap.sum()
+    if feedback:
+        stepper.reaction(1.0)
     stepper.restore(stepper.state())

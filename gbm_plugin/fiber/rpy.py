@@ -290,6 +290,16 @@ def ambient(flow, radius, v, s):
         store3(s, i, scale(radius, load3(rotation, i)))
 
 
+@part
+def contacts(chain, flow, torques, work, multipliers, gaps_of):
+    """Multipliers under the flow and given torques on the beads, once assembled; gaps_of: what roll gives."""
+    state, _, radius, _ = chain
+    (pairs, factor, gaps, v, s, _), _ = layout(work, state.shape[0] // 3)
+    ambient(flow, radius, v, s)
+    torques_to_motion(pairs, torques, v, s)
+    roll(state, factor, gaps, v, s, multipliers, gaps_of)
+
+
 @inlined
 def _joint_moment(state, j, law):
     """Moment at bead j, none at the ends."""

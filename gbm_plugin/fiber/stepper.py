@@ -17,6 +17,8 @@ from .fibers import Fibers, positive
 from .layout import bead_positions, pack, unpack
 from .model import MotionOptions
 from .rates import material
+from .reaction import EXERT, Reaction, implicit_sigma, powers_of
+from .reaction import scratch_rows as reaction_rows
 from .simd import LANES
 from .state import check_state
 from .strain import with_strain
@@ -57,6 +59,8 @@ class Stepper:
         self.time = float(time)
         self.provisional = False
         self._ambient = Ambient(fibers.count, fibers.beads)
+        self._push: NDArray | None = None  # velocities of repulsion at the newest sample
+        self._reacting: NDArray | None = None  # scratch of reaction()
         self._material = material(fibers)
         # before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
         self._state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
@@ -138,8 +142,8 @@ class Stepper:
         if self.need == "gradient":
             velocity, extra = with_strain(self.positions, velocity, extra, self.fibers.radius)
         if self.repulsion:
-            push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
-            velocity = velocity + push
+            self._push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
+            velocity = velocity + self._push
         self._ambient.observe(time, velocity, extra)
 
     def _field(self, name: str, values: ArrayLike | None, tail: tuple[int, ...]) -> NDArray:
@@ -154,6 +158,43 @@ class Stepper:
                 f"after step {self._counts['steps']}"
             )
         return array
+
+    def reaction(self, time_step: float) -> Reaction:
+        """Force and torque (F, N, 3) of every bead on the fluid at the newest sample, which is of the present time,
+        and their powers. time_step: of the run, within which stiff modes of implicit fibers relax (reaction.py).
+
+        Raises ValueError without a sample of the present time.
+        """
+        if not self._ambient.times or self._ambient.times[-1] != self.time:
+            raise ValueError(
+                f"no sample of the flow at time {self.time:g}; observe() comes before reaction()"
+            )
+        fibers, mu = self.fibers, self.fibers.viscosity
+        if self._reacting is None:
+            rows = reaction_rows(self.mobility, fibers.beads)
+            self._reacting = np.zeros((available(), rows, LANES))
+        velocity, rotation = self._ambient.samples[-1]
+        drag = 6 * np.pi * mu * fibers.radius
+        sizes, out = np.array([drag, drag * fibers.radius]), np.empty((fibers.count, 2, fibers.beads, 3))
+        powers = np.zeros((len(self._state), 3, LANES))
+        in_shares(
+            EXERT[self.mobility, self.integrator != "ab3"],
+            self._beads,
+            self._material,
+            implicit_sigma(time_step, fibers.radius),
+            self._state,
+            velocity,
+            rotation,
+            self._reacting,
+            sizes,
+            powers,
+            out,
+            most=len(self._reacting),
+        )
+        force, torque = out[:, 0], out[:, 1]
+        if self._push is not None:
+            force = force + drag * self._push
+        return Reaction(force, torque, *powers_of(powers, fibers.count, mu, fibers.radius))
 
     def advance(self, time_step: float) -> None:
         """Advance by time_step, extrapolating the samples in time along each bead's path.

@@ -37,10 +37,10 @@ MOST_NUMBERS = 64  # of an array for each bead: 4 samples of velocity and rotati
 SMALL = 1 << 16  # arrays of so many bytes are read, whatever they are
 
 
-def prepare_kernels(families: Sequence[Family]) -> None:
+def prepare_kernels(families: Sequence[Family], feedback: bool = False) -> None:
     """All that these families will call is compiled when this returns: in a step somebody waits."""
     for options in {tuple(f.model.motion.items()) for f in families}:
-        prepare(**dict(options))
+        prepare(feedback, **dict(options))
 
 
 class Fleet(Group):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
@@ -13,9 +14,11 @@ from .. import __version__
 from ..case.layout import daemon_table, recording_name, warnings_file
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share
+from ..fiber import Reaction
 from ..files import created
 from ..output.recording import FamilyRecord, Recorder
 from ..output.restarts import keep_earlier
+from ..sampling import rotation_of
 from .fleet import GAP_WARNING, Fleet
 from .gathering import Gathering
 
@@ -26,7 +29,8 @@ class Journal:
     """Takes the samples of the flow for a fleet, and writes down what became of it.
 
     `fibers.h5` holds the positions of every `recordInterval`-th step, and of the first. `daemon.dat` has a row a
-    step: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s], <R^2>/L^2 of each family.
+    step: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s], <R^2>/L^2 of each family; with
+    feedback also exchange, the power that the fluid gets, friction, Φ, and bending, dE_b/dt [W].
     `statistics.h5`, where it is asked for, has what `Gathering` gathers.
     """
 
@@ -45,6 +49,7 @@ class Journal:
         time folder that the fleet continues from."""
         self.scene, self.fleet = scene, fleet
         self._recorded = False
+        self.reaction: Reaction | None = None  # of the fibers on the flow at the newest sample, with feedback
         self._folder, self._share = folder, share
         self._warnings: IO | None = None
         self._steps, self._badly_predicted = 0, 0
@@ -65,6 +70,7 @@ class Journal:
         self._path = keep_earlier(folder / daemon_table(share))
         self._table = created(self._path, buffering=1)
         names = ["Time", "step", "sentAt", "arrivedAt", "gap", *(f"R2_{f.name}" for f in scene.families)]
+        names += ["exchange", "friction", "bending"] if scene.coupling.feedback else []
         self._table.write("# " + "\t".join(names) + "\n")
 
     def take(
@@ -85,7 +91,16 @@ class Journal:
             return False
         gap, wrong = fleet.check_prediction(velocity, step)
         self._note_prediction(step, wrong)
-        self._add_row(step, sent_at, arrived_at, gap)
+        powers = []
+        if self.scene.coupling.feedback:
+            self.reaction = fleet.reaction(self.scene.time_step)
+            rotation = rotation_of(extra) if extra.ndim == 3 else extra
+            powers = [
+                self.reaction.exchange(velocity, rotation),
+                self.reaction.friction,
+                self.reaction.bending,
+            ]
+        self._add_row(step, sent_at, arrived_at, gap, powers)
         if not self._recorded or step % self.scene.record_interval == 0:
             self.recorder.append(step, fleet.time, fleet.by_family)
             self._recorded = True
@@ -122,9 +137,12 @@ class Journal:
                 self._warnings = created(keep_earlier(self._folder / warnings_file(self._share)), buffering=1)
             self._warnings.write(text + "\n")
 
-    def _add_row(self, step: int, sent_at: float, arrived_at: float, gap: float) -> None:
+    def _add_row(
+        self, step: int, sent_at: float, arrived_at: float, gap: float, powers: Sequence[float]
+    ) -> None:
         row = [f"{self.fleet.time:.12g}", str(step), f"{sent_at:.6f}", f"{arrived_at:.6f}", f"{gap:.6g}"]
         row += [f"{ratio:.9g}" for ratio in self.fleet.end_to_end_ratio()]
+        row += [f"{power:.15g}" for power in powers]
         try:
             self._table.write("\t".join(row) + "\n")
         except OSError as error:

@@ -116,6 +116,55 @@ def on_grid(word: str, fields: NDArray, points: NDArray) -> NDArray:
 
 
 @kernel
+def _spread_trilinear(values, points, nodes):
+    """The transpose of `trilinear`: nodes += values (P, m) by the weights of their points."""
+    nx, ny, nz, fields = nodes.shape
+    for p in range(points.shape[0]):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
+        a, b, c = x - i, y - j, z - k
+        i0, j0, k0 = i % nx, j % ny, k % nz
+        i1, j1, k1 = (i0 + 1) % nx, (j0 + 1) % ny, (k0 + 1) % nz
+        for ix, wx in ((i0, 1 - a), (i1, a)):
+            for jy, wy in ((j0, 1 - b), (j1, b)):
+                near, far = nodes[ix, jy, k0], nodes[ix, jy, k1]
+                for m in range(fields):
+                    value = wx * wy * values[p, m]
+                    near[m] += value * (1 - c)
+                    far[m] += value * c
+
+
+@kernel
+def _spread_lagrange(values, points, scale, nodes):
+    """The transpose of `lagrange`."""
+    nx, ny, nz, fields = nodes.shape
+    width = scale.size
+    weights, places = np.empty((3, width)), np.empty((3, width), np.intp)
+    for p in range(points.shape[0]):
+        _nearest(points[p, 0], nx, scale, weights[0], places[0])
+        _nearest(points[p, 1], ny, scale, weights[1], places[1])
+        _nearest(points[p, 2], nz, scale, weights[2], places[2])
+        for i in range(width):
+            for j in range(width):
+                row, plane = nodes[places[0, i], places[1, j]], weights[0, i] * weights[1, j]
+                for k in range(width):
+                    node, weight = row[places[2, k]], plane * weights[2, k]
+                    for m in range(fields):
+                        node[m] += weight * values[p, m]
+
+
+def spread(word: str, values: NDArray, points: NDArray, cells: tuple[int, int, int]) -> NDArray:
+    """Fields (m, *cells) of values (P, m) at points, by the transpose of `on_grid`: for all fields g, sum of (fields g)
+    = sum of values times on_grid(word, g, points). In the order of `for_sampling`; added up in that of the points."""
+    nodes = np.zeros((*cells, values.shape[1]))
+    if word == "trilinear":
+        _spread_trilinear(only_read(values), only_read(points), nodes)
+    else:
+        _spread_lagrange(only_read(values), only_read(points), _scale(word), nodes)
+    return np.moveaxis(nodes, -1, 0)
+
+
+@kernel
 def _lagrange_slopes(nodes, points, scale, out):
     """out (P, m, 3): derivatives of the interpolant of `lagrange` in units of cells."""
     width = scale.size

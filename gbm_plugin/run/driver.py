@@ -20,6 +20,7 @@ from ..case.prepare import name_for_paraview
 from ..case.scene import Scene
 from ..case.times import Start
 from ..errors import CaseError, RunError
+from ..fiber import Reaction
 from ..fleet.fleet import Fleet
 from ..fleet.journal import Journal
 from ..signals import Asked, handled
@@ -48,6 +49,9 @@ class Carrier:
 
     def advance(self) -> None:
         """One time step."""
+
+    def react(self, positions: np.ndarray, reaction: Reaction) -> None:
+        """Take what the fibers do to the flow at the present time, with feedback."""
 
     def note(self, time: float) -> None:
         """The row of a time."""
@@ -141,6 +145,8 @@ class Run:
             taken = self.journal.take(
                 self.step, *self.carrier.sample(fleet.positions, fleet.time, fleet.need)
             )
+        if self.journal.reaction is not None:
+            self.carrier.react(fleet.positions, self.journal.reaction)
         self.carrier.note(fleet.time)
 
     def _advance(self) -> None:

@@ -20,6 +20,7 @@ from ..case.layout import FLOW_FILE, SPECTRAL, flow_table, results
 from ..case.scene import Forcing, Scene
 from ..case.times import choose_start
 from ..errors import CaseError, StateError
+from ..fiber import Reaction
 from ..files import created, replaced
 from ..output.restarts import keep_earlier
 from ..scales import kolmogorov_length, taylor_reynolds
@@ -57,6 +58,11 @@ def run_spectral(
         log.info(COMPLETE, start.time)
         return True
     cycles = _sub_cycles(scene.case)
+    if scene.coupling.feedback and cycles > 1:
+        raise CaseError(
+            f"{scene.case}/system/fvSolution: nSubCycles is {cycles}: with feedback the flow and its fibers take the "
+            "same steps, and it must be 1"
+        )
     solver = SpectralSolver(
         cells,
         scene.kinematic_viscosity,
@@ -143,23 +149,31 @@ class _SpectralFlow(Carrier):
         path = results(self.scene.case, forcing) / name / flow_table(forcing)
         path.parent.mkdir(parents=True, exist_ok=True)
         self.table = created(keep_earlier(path), buffering=1)
-        self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(COLUMNS) + "\n")
+        columns = [*COLUMNS, *(["exchange"] if self.scene.coupling.feedback else [])]
+        self.table.write("# Pseudo-spectral solver, SI units, per unit mass\n# " + "\t".join(columns) + "\n")
 
     def advance(self) -> None:
         self.solver.advance(self.cycles)
 
+    def react(self, positions: np.ndarray, reaction: Reaction) -> None:
+        places, density = positions - np.asarray(self.scene.origin), self.scene.density
+        self.solver.set_point_forces(places, reaction.force / density, reaction.torque / density)
+
     def note(self, time: float) -> None:
-        energy, power, dissipation = self.solver.energetics().values()
+        energy, power, dissipation, exchange = self.solver.energetics().values()
         balance = dissipation
-        self.before, self.now = self.now, (energy, power)
+        self.before, self.now = self.now, (energy, power + exchange)
         if self.before is not None:
-            balance = 0.5 * (power + self.before[1]) - (energy - self.before[0]) / self.scene.time_step
+            balance = (
+                0.5 * (power + exchange + self.before[1]) - (energy - self.before[0]) / self.scene.time_step
+            )
         nu, u = self.scene.kinematic_viscosity, math.sqrt(2 * energy / 3)
         reynolds = taylor_reynolds(u, nu, dissipation)
         eta = kolmogorov_length(nu, dissipation)
         coefficient = power / (2 * energy) if energy > 0 else 0.0
         mean = self.solver.coefficients[:, 0, 0, 0].real
         row = (time, energy, balance, dissipation, dissipation, u, reynolds, eta, coefficient, power, *mean)
+        row += (exchange,) if self.scene.coupling.feedback else ()
         self.table.write("\t".join(f"{x:.12g}" for x in row) + "\n")
 
     def save(self, folder: Path) -> None:

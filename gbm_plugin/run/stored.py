@@ -46,6 +46,11 @@ def run_stored(
     Raises CaseError or ValueError for what cannot be replayed, FloatingPointError where a field or a fiber is
     not finite.
     """
+    if scene.coupling.feedback:
+        raise CaseError(
+            f"{scene.case}/constant/fiberProperties: feedback is yes, and stored fields cannot be changed: with "
+            "--flow stored it must be no"
+        )
     if scene.cells is None:
         raise CaseError(f"{scene.case}/system/blockMeshDict: a replay needs a mesh of one uniform block")
     if scene.interpolation not in WORDS:

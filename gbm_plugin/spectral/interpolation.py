@@ -14,6 +14,21 @@ def on_grid(word: str, fields: NDArray, positions: NDArray, box: float) -> NDArr
     return grid.on_grid(word, fields, positions * (fields.shape[1] / box))
 
 
+def spread_on_grid(word: str, values: NDArray, positions: NDArray, box: float, cells: int) -> NDArray:
+    """Densities (m, n, n, n) of point values (P, m), by the transpose of `on_grid`."""
+    per_cell = grid.spread(word, values, positions * (cells / box), (cells, cells, cells))
+    return per_cell * (cells / box) ** 3
+
+
+def fourier_spread(values: NDArray, positions: NDArray, box: float, cut: int, threads: int = 1) -> NDArray:
+    """Modes (m, 2K+1, 2K+1, K+1) of the densities of point values (P, m), the transpose of `fourier_sum`."""
+    x, y, z = np.ascontiguousarray((positions % box).T) * (2 * np.pi / box)
+    strengths = np.ascontiguousarray(values.T, dtype=complex)
+    size = (2 * cut + 1,) * 3
+    modes = finufft.nufft3d1(x, y, z, strengths, size, isign=-1, eps=1e-14, modeord=1, nthreads=threads)
+    return modes.reshape(-1, *size)[..., : cut + 1] / box**3
+
+
 def fourier_sum(modes: NDArray, positions: NDArray, box: float, threads: int = 1) -> NDArray:
     """The fields with modes (m, 2K+1, 2K+1, K+1) at positions (P, 3), (P, m), by non-uniform FFT to 1e-14."""
     half = modes.shape[3]

@@ -64,6 +64,7 @@ class SpectralSolver:
         self._stepper = SCHEMES[scheme](self.operators)
         self._u = self.operators.zeros()
         self._energy = 0.0
+        self._points: Array | None = None  # modes of the point forces
         self._fields: dict[str, Array] = {}  # physical fields of the present time
         self._spare: dict[str, Array] = {}  # those of the past, to be written over
 
@@ -109,6 +110,38 @@ class SpectralSolver:
         """Fourier coefficients of the velocity, (3, 2K+1, 2K+1, K+1), ordered as `Modes` says."""
         return self.operators.host(self._u).copy()
 
+    def set_point_forces(
+        self, positions: ArrayLike, force: ArrayLike | None, torque: ArrayLike | None = None
+    ) -> None:
+        """Forces and torques (..., 3) on the fluid at positions (..., 3), over its density, from now on until the next
+        call; None: no more.
+
+        They are spread by the transpose of `sample`, torques as half the curl of their density, so that
+        sum F.u + T.(curl u)/2 of the sampled flow is the integral of f.u to rounding. Their mean, which would move the
+        whole fluid, is left out. The scheme takes them as the rest of du/dt, constant within the first two steps
+        of "ab3" and every one of "rk4".
+        """
+        if force is None:
+            self._points = None
+            return
+        points = np.ascontiguousarray(positions, float).reshape(-1, 3)
+        values = np.ascontiguousarray(force, float).reshape(-1, 3)
+        if torque is not None:
+            values = np.concatenate([values, np.asarray(torque, float).reshape(-1, 3)], axis=1)
+        if len(values) != len(points):
+            raise ValueError(f"there are {len(values)} forces at {len(points)} positions")
+        if not (np.isfinite(points).all() and np.isfinite(values).all()):
+            raise ValueError("positions, forces and torques must be finite")
+        operators = self.operators
+        if self.interpolation == "exact":
+            modes = interpolate.fourier_spread(values, points, self.box, self.modes.cut, self._threads)
+            modes = operators.xp.asarray(modes, operators.complex)
+        else:
+            spread = (self.interpolation, values, points, self.box, self.cells)
+            modes = operators.to_modes(interpolate.spread_on_grid(*spread))
+        total = modes[:3] if torque is None else modes[:3] + operators.curl(modes[3:]) / 2
+        self._points = operators.project(total)
+
     def advance(self, steps: int = 1) -> None:
         """Take time steps."""
         for _ in range(steps):
@@ -146,22 +179,37 @@ class SpectralSolver:
         )
 
     def energetics(self) -> dict[str, float]:
-        """kinetic_energy of the fluctuations, power and dissipation at the present time; costs no transform."""
+        """kinetic_energy of the fluctuations, power of the forcing, dissipation, and exchange, the power of the point
+        forces, at the present time; costs no transform."""
         return {
             "kinetic_energy": self._energy,
             "power": self.forcing.input(self._u, self._energy),
             "dissipation": self._dissipation(),
+            "exchange": float(self._mode_exchange().sum()),
         }
 
+    def exchange_spectrum(self) -> tuple[NDArray, NDArray]:
+        """k (S,) and the power (S,) that the point forces give to the shells of `spectrum`; its sum times their width,
+        2 pi/box, is <f.u>."""
+        return turbulence.shell_spectrum(self._mode_exchange(), self.modes.k, self.modes.k0)
+
+    def _mode_exchange(self) -> NDArray:
+        if self._points is None:
+            return np.zeros(self.modes.shape)
+        a, f = self.operators.host(self._u), self.operators.host(self._points)
+        return (a.real * f.real + a.imag * f.imag).sum(axis=0, dtype=float) * self.modes.weights
+
     def energy_budget(self) -> dict[str, float]:
-        """rate = d<|u|^2>/2dt = power + transfer - dissipation; transfer (nonlinear) vanishes to rounding."""
+        """rate = d<|u|^2>/2dt = power + exchange + transfer - dissipation; transfer (nonlinear) vanishes to rounding;
+        exchange, of point forces, where there are any."""
         slope = self.operators.zeros()
         self._evaluate(self._u, slope, self._energy)
         a, b = self.operators.host(self._u).astype(complex), self.operators.host(slope)
         gain = float(((a * b.conj()).real * self.modes.weights).sum())
-        power, dissipation = self.forcing.input(self._u, self._energy), self._dissipation()
-        transfer, rate = gain - power, gain - dissipation
-        return {"power": power, "dissipation": dissipation, "transfer": transfer, "rate": rate}
+        _, power, dissipation, exchange = self.energetics().values()
+        transfer, rate = gain - power - exchange, gain - dissipation
+        budget = {"power": power, "dissipation": dissipation, "transfer": transfer, "rate": rate}
+        return budget if self._points is None else budget | {"exchange": exchange}
 
     def sample(
         self, positions: ArrayLike, time: float, need: str = "gradient"
@@ -245,6 +293,8 @@ class SpectralSolver:
         linear = self.forcing.rate(energy)
         self.operators.nonlinear(u, out, linear, want_speed=self.cfl is not None)
         self.forcing.add(out)
+        if self._points is not None:
+            out += self._points
 
     def _choose(self) -> float:
         """The length of the step that begins, the velocity at its start having been seen."""
