@@ -24,6 +24,12 @@ def test_presets_have_their_own_numbers(tmp_path):
     assert flow.forcing.type == "eswaranPope" and flow.application == "boxFoam"
     assert read_scene(new_case(tmp_path / "c", "pimpleFoam")).application == "pimpleFoam"
     assert read_scene(new_case(tmp_path / "b", "taylor-green")).forcing is None
+    two = read_scene(new_case(tmp_path / "two", "flow-II"))
+    assert two.box == pytest.approx((4.1,) * 3) and max(f.length for f in two.families) < two.box[0] / 2
+    assert (
+        sum(f.count * f.beads for f in two.families) < 60_000
+        and two.statistics.interval == two.record_interval
+    )
 
 
 def test_comments_and_everything_else_stay(tmp_path):
@@ -39,7 +45,7 @@ def test_a_folder_that_is_there_and_a_preset_that_is_not(tmp_path, capsys):
         new_case(tmp_path)
     assert main(["new", str(tmp_path / "c"), "--preset", "flow-2"]) == 1
     assert (
-        "allowed: default quick pimpleFoam flow-I flow-II-start flow-II taylor-green"
+        "allowed: default quick pimpleFoam flow-I flow-II-start flow-II flow-II-wide-start flow-II-wide taylor-green"
         in capsys.readouterr().err
     )
     assert not (tmp_path / "c").exists()

@@ -339,9 +339,7 @@ def test_reference_values_are_the_projects():
     assert {name: stored[name] for name in TAYLOR_GREEN} == TAYLOR_GREEN
 
 
-@pytest.mark.parametrize(
-    "name, epsilon, cells", [("flow_I", 0.0015, 128), ("flow_II", 0.34, 512), ("flow_II_prime", 0.05, 256)]
-)
+@pytest.mark.parametrize("name, epsilon, cells", [("flow_I", 0.0015, 128), ("flow_II", 0.34, 512)])
 def test_presets_aim_at_their_dissipation(name, epsilon, cells):
     """Eswaran & Pope's own estimate, eps = 4 eps* N_F / (1 + T* N_F^(1/3) / 0.8), holds to 15 % (k0 = 1)."""
     preset = PRESETS[name]
@@ -350,6 +348,6 @@ def test_presets_aim_at_their_dissipation(name, epsilon, cells):
     memory = preset.time_scale * drive ** (1 / 3)
     assert 4 * drive * count / (1 + memory * count ** (1 / 3) / 0.8) == pytest.approx(epsilon, rel=0.15)
     assert preset.cells == cells
-    solver = preset.solver(cells=16)
+    solver = preset.solver(cells=24)
     solver.advance(3)
     assert solver.statistics()["power"] != 0
