@@ -9,6 +9,7 @@ import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,6 +28,7 @@ def main(argv: list[str] | None = None) -> int:
     arguments = _parser(words).parse_args(words)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[_Screen(sys.stdout)])
     logging.getLogger("gbm_plugin").setLevel(logging.INFO)  # and not what libraries have to say
+    warnings.showwarning = lambda message, *_: logging.warning("%s", message)  # without the line of code
     try:
         result = arguments.action(arguments)
         if result is not None and getattr(arguments, "json", None):

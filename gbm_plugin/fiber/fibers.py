@@ -13,6 +13,7 @@ from .contact import self_contacts
 from .model import FiberOptions
 
 TOUCHING = 1e-6  # largest relative difference of a bead spacing from 2a
+FASTEST = 1e200  # largest bending rate K/μd⁴ [1/time] that numbers can hold with all that is made of it
 
 
 def finite_array(name: str, value: ArrayLike, shape_text: str, dimensions: int) -> np.ndarray:
@@ -83,6 +84,8 @@ class Fibers:
             raise ValueError(f"stiffness has shape {value.shape}; it must be one number or ({self.count},)")
         if not np.isfinite(value).all() or (value < 0).any():
             raise ValueError(f"stiffness is {value}; it must be finite and not negative")
+        if value.max() > FASTEST * self.viscosity * (2 * self.radius) ** 4:
+            raise ValueError(f"stiffness is {value}: more than {FASTEST:g} times μd⁴ cannot be computed with")
         return np.broadcast_to(value, (self.count,)).copy()
 
     @classmethod

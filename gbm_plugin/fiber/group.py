@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,14 @@ from .stepper import Stepper
 
 
 class Group:
-    """Steppers as one: the calls are those of Stepper, for beads (B, 3) of all families one after the other."""
+    """Steppers as one: the calls are those of Stepper, for beads (B, 3) of all families one after the other.
 
-    def __init__(self, steppers: Sequence[Stepper]):
+    names: of the families, by which errors name them; one alone has none.
+    """
+
+    def __init__(self, steppers: Sequence[Stepper], names: Sequence[str] = ()):
         self.steppers = tuple(steppers)
+        self._names = list(names) or [str(n) for n in range(len(self.steppers))] * (len(self.steppers) > 1)
         ends = np.cumsum([s.fibers.count * s.fibers.beads for s in self.steppers])
         self._parts = [
             slice(end - s.fibers.count * s.fibers.beads, end) for s, end in zip(steppers, ends, strict=True)
@@ -60,8 +65,9 @@ class Group:
         its own."""
         velocities = self.split(np.asarray(velocity))
         extras = [None] * len(velocities) if extra is None else self.split(np.asarray(extra))
-        for stepper, own, other in zip(self.steppers, velocities, extras, strict=True):
-            stepper.observe(time, own, _needed(stepper.need, other))
+        for number, (own, other) in enumerate(zip(velocities, extras, strict=True)):
+            with self._named(number) as stepper:
+                stepper.observe(time, own, _needed(stepper.need, other))
 
     def reaction(self, time_step: float) -> Reaction:
         """Forces and torques (B, 3) on the fluid at the newest sample, and the powers of all; as that of Stepper."""
@@ -72,8 +78,9 @@ class Group:
     def advance(self, time_step: float) -> None:
         """All by one step."""
         self._positions = None
-        for s in self.steppers:
-            s.advance(time_step)
+        for number in range(len(self.steppers)):
+            with self._named(number) as stepper:
+                stepper.advance(time_step)
 
     @property
     def provisional(self) -> bool:
@@ -84,9 +91,20 @@ class Group:
         """Redo the last step of those that must; of all, where none must."""
         self._positions = None
         some = self.provisional
-        for s in self.steppers:
-            if s.provisional or not some:
-                s.correct()
+        for number in range(len(self.steppers)):
+            with self._named(number) as stepper:
+                if stepper.provisional or not some:
+                    stepper.correct()
+
+    @contextmanager
+    def _named(self, number: int) -> Iterator[Stepper]:
+        """The stepper of a family, whose errors then say of which."""
+        try:
+            yield self.steppers[number]
+        except (ValueError, FloatingPointError) as error:
+            if not self._names:
+                raise
+            raise type(error)(f"family {self._names[number]}: {error}") from None
 
     def undo(self) -> None:
         """Take the last step back."""

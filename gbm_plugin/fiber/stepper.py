@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..sampling import lagrange_weights
 from . import ab3, implicit
 from .ambient import SAMPLES, Ambient
+from .bending import FOLD
 from .blocks import Samples
 from .contact import repulsion_velocity
-from .fibers import Fibers, positive
+from .fibers import TOUCHING, Fibers, positive
 from .layout import bead_positions, pack, unpack
 from .model import MotionOptions
 from .rates import material
@@ -28,6 +29,7 @@ TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
 SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open within 1e-14
+LOST = 0.5  # [rad] estimated error of a sub-step of ab3 beyond which its links point nowhere in particular
 
 
 class Stepper:
@@ -35,6 +37,7 @@ class Stepper:
 
     options: of model.MotionOptions. integrator "ab3": third order, sub-steps within eq. (10); "implicit": second, any
     step; "auto": ab3 where eq. (10) allows the whole step and the error estimate too, else implicit, fiber by fiber.
+    ab3 has no tolerance: its sub-steps are stable, and as accurate as they happen to be; what is lost is refused.
     tolerance (for implicit and auto; None: 1e-3): bead displacement over fiber length. Every accepted step of
     every fiber is held to a tenth of it, in the rms rotation of its links, so that a relaxation of several
     steps stays within. repulsion: below about 1/time_step.
@@ -133,10 +136,11 @@ class Stepper:
         """Take the flow at the current positions: velocity (F, N, 3); rotation (F, N, 3) or gradient.
 
         A second sample at the same time replaces the first. Raises ValueError for another time or shape,
-        FloatingPointError for NaN.
+        FloatingPointError for NaN, and for a fiber so far away that rounding blurs its beads.
         """
         if time != self.time:
             raise ValueError(f"sample is of time {time:g}; the fibers are at time {self.time:g}")
+        self._near()
         tail = (3, 3) if self.need == "gradient" else (3,)
         velocity, extra = self._field("velocity", velocity, (3,)), self._field(self.need, extra, tail)
         if self.need == "gradient":
@@ -196,10 +200,21 @@ class Stepper:
             force = force + drag * self._push
         return Reaction(force, torque, *powers_of(powers, fibers.count, mu, fibers.radius))
 
+    def _near(self) -> None:
+        """FloatingPointError where a fiber is so far from the origin that its beads could not be told apart."""
+        reach = TOUCHING * 2 * self.fibers.radius / np.finfo(float).eps
+        if not np.abs(self._state[:, -3:]).max() <= reach:
+            far = ~(np.abs(unpack(self._state[:, -3:], (self.fibers.count, 3))).max(axis=1) <= reach)
+            raise FloatingPointError(
+                f"fiber {np.flatnonzero(far)[0]} is more than {reach:.2g} from the origin at time {self.time:g}: "
+                f"double precision no longer tells its beads apart, whose diameter is {2 * self.fibers.radius:g}"
+            )
+
     def advance(self, time_step: float) -> None:
         """Advance by time_step, extrapolating the samples in time along each bead's path.
 
-        Raises ValueError without a sample at the present time, FloatingPointError where a fiber becomes NaN.
+        Raises ValueError without a sample at the present time, and where ab3 cannot take the step; FloatingPointError
+        where a fiber becomes NaN, or too stiff for its bends.
         """
         length = positive("time_step", time_step)
         if not self._ambient.times or self._ambient.times[-1] != self.time:
@@ -249,7 +264,7 @@ class Stepper:
                     f"ab3 would need {count:.3g} sub-steps in a step of {self._length:g}; at most "
                     f"{MOST_SUBSTEPS} are allowed: take the implicit integrator"
                 )
-            self._explicit(count)
+            self._followed(self._explicit(count), count)
             return
         everyone = np.arange(self.fibers.count)
         if count == 1:
@@ -265,7 +280,8 @@ class Stepper:
         softness = 1.0
         if fibers.curvature_law == "discreteRod":
             links = self._last.reshape(len(self._last), fibers.beads, 3, LANES)[:, :-1]
-            softness = min(1.0, 0.5 + 0.5 * (links[:, 1:] * links[:, :-1]).sum(axis=2).min(initial=1.0))
+            cosine = (links[:, 1:] * links[:, :-1]).sum(axis=2).min(initial=1.0)
+            softness = min(1.0, 0.5 * max(1.0 + cosine, FOLD))
         limit = ab3.stable_step(fibers, softness, self._last_tension)
         return max(1, int(np.ceil(min(self._length / limit * (1 - 1e-12), 1e18))))
 
@@ -330,14 +346,32 @@ class Stepper:
             before = after
             attempts += 1
             self._count(0, error[members][error[members] <= self.local_tolerance])
-            if (trial[members] < SMALLEST_STEP * end).any():
-                self._finite(np.where(trial[members] < SMALLEST_STEP * end, np.nan, 0.0), members)
+            self._possible(members[trial[members] < SMALLEST_STEP * end], error)
             members = members[elapsed[members] < end * (1 - 1e-12)]
             if attempts == 1:
                 refined = members
             self._counts["refinements"] += len(members)
         self._counts["refined_fibers"] += len(refined)
         self._counts["substeps"] += attempts
+
+    def _followed(self, error: np.ndarray, count: int) -> None:
+        """ValueError where ab3 did not follow the motion."""
+        if not error.max() <= LOST:
+            raise ValueError(
+                f"ab3 loses fiber {error.argmax()} in step {self._counts['steps']}, from time {self._start:g}: links "
+                f"turn by {error.max():.2g} rad more in third than in second order within {self._length / count:.3g}; "
+                "take shorter steps, or the integrator implicit or auto"
+            )
+
+    def _possible(self, members: np.ndarray, error: np.ndarray) -> None:
+        """FloatingPointError where implicit needs steps that are too short, of which the first fiber is named."""
+        if not len(members):
+            return
+        self._finite(error[members], members)
+        raise FloatingPointError(
+            f"fiber {members[0]} needs steps below {SMALLEST_STEP:g} of {self._length:g} in step "
+            f"{self._counts['steps']}, from time {self._start:g}: it is too stiff for so bent a shape"
+        )
 
     def _count(self, substeps: int, error: np.ndarray) -> None:
         self._counts["substeps"] += substeps

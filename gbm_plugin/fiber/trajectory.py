@@ -27,6 +27,7 @@ ORDER = 4  # of the error of a part in its length, with quadratic extrapolation
 # what is left of the estimate after the first steps, which were corrected, by the samples at hand: of the first
 # nothing is known before the second, whose linear prediction shows that it was 1/12 of this gap off, not 5/12
 STARTING = {2: 0.0, 3: 1 / 5}
+LOST = 0.3  # of a fiber's length: an error of one step of ab3 after which the path is another one
 CORRECTED = 1 / 9  # of that error stays with quadratic interpolation between both ends: 1/24 instead of 3/8
 
 
@@ -70,9 +71,10 @@ def simulate(
     """Trajectory of fibers carried by flow from start_time to end_time; a list of them for a list of families, which
     move together: the flow is sampled once for all.
 
-    With ab3 the flow is sampled once per time_step. With implicit and auto a time step is divided where the flow along
-    the paths cannot be extrapolated over it within the tolerance: as often as that takes, except in a flow that is
-    known at times of its own only (`sample_interval`, a SpectralSolver), which is sampled at each of them.
+    With ab3 the flow is sampled once per time_step, and a step that cannot be followed so is refused. With implicit
+    and auto a time step is divided where the flow along the paths cannot be extrapolated over it within the tolerance:
+    as often as that takes, except in a flow that is known at times of its own only (`sample_interval`, a
+    SpectralSolver), which is sampled at each of them.
     record_every: steps between records; None records start and end. The other options are those of Stepper; the flow's
     sample() is as in gbm_plugin.flow. The fibers themselves are not changed.
 
@@ -218,11 +220,19 @@ class _Run:
 
 
 class _OnceAStep(_Run):
-    """The flow is sampled once in a step, whatever that costs."""
+    """The flow is sampled once in a step, whatever that costs, unless it costs everything."""
 
     def move(self, end: float) -> None:
-        self.step_by(end - self.time)
-        self.accept(self.flow_error())
+        start = self.time
+        self.step_by(end - start)
+        error = self.flow_error()
+        if not error <= LOST:
+            raise ValueError(
+                f"the flow along the fibers changes too fast for a step of {end - start:g} from time {start:g}: "
+                f"extrapolating it costs {error:.2g} of a fiber's length; take shorter steps, or the integrator "
+                "implicit or auto, which divide them"
+            )
+        self.accept(error)
 
 
 class _InParts(_Run):

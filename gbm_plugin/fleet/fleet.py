@@ -47,7 +47,7 @@ class Fleet(Group):
     """The fibers of a scene on their way through time, one family after the other."""
 
     def __init__(self, families: Sequence[Family], steppers: Sequence[Stepper], share: Share = WHOLE):
-        super().__init__(steppers)
+        super().__init__(steppers, [family.name for family in families])
         self.families = tuple(families)
         self.share = share
         self._step_length = 0.0

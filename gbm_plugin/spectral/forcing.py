@@ -17,7 +17,7 @@ Value = NDArray | float
 
 
 class Forcing:
-    """No force; the base of all others."""
+    """The base of all forces, without one."""
 
     def bind(self, operators: Arrays) -> None:
         """Take the mode set and the array library of the solver that this force will drive."""
@@ -36,6 +36,10 @@ class Forcing:
         """<u.f>, from the modes of u and the kinetic energy of its fluctuations."""
         return 2 * self.rate(energy) * energy if energy > 0 else 0.0
 
+    def reach(self, energy: float, time_step: float) -> float:
+        """The largest kinetic energy to which this force can bring the flow in a step; inf where it does not know."""
+        return math.inf
+
     def state(self) -> dict[str, Value]:
         """All that a bitwise restart needs."""
         return {}
@@ -46,6 +50,13 @@ class Forcing:
 
     def restore(self, state: dict[str, Value]) -> None:
         """Continue from `state()`."""
+
+
+class Unforced(Forcing):
+    """No force: the energy can only decay."""
+
+    def reach(self, energy: float, time_step: float) -> float:
+        return energy
 
 
 class LinearForcing(Forcing):
@@ -72,6 +83,11 @@ class LinearForcing(Forcing):
                 "LinearForcing with constant power needs a fluid that moves: set a velocity first"
             )
         return self.power / (2 * energy)
+
+    def reach(self, energy: float, time_step: float) -> float:
+        if self.power is not None:
+            return energy + self.power * time_step
+        return energy * math.exp(min(2 * self.coefficient * time_step, 700.0))
 
 
 class EswaranPope(Forcing):
@@ -137,6 +153,11 @@ class EswaranPope(Forcing):
     def input(self, u: Array, energy: float) -> float:
         velocity = self._operators.host(u[(slice(None), *self._index)]).astype(complex)
         return float((self._weights * (velocity * self._stored().conj()).real).sum())
+
+    def reach(self, energy: float, time_step: float) -> float:
+        # d|u|/dt <= |f|, with |.| the rms over the box
+        force = math.sqrt(2 * float((abs(self.force()) ** 2).sum()))
+        return 0.5 * (math.sqrt(2 * energy) + force * time_step) ** 2
 
     def state(self) -> dict[str, Value]:
         return {"amplitudes": self._b.copy(), "draws": float(self.draws)}

@@ -1,5 +1,7 @@
 """The pseudo-spectral Navier-Stokes solver of the periodic box."""
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -7,13 +9,18 @@ from gbm_plugin.arrays import Form, check_arrays
 from gbm_plugin.sampling import NEEDS, one_of
 from gbm_plugin.spectral import interpolation as interpolate
 from gbm_plugin.spectral.arrays import Array, Arrays
-from gbm_plugin.spectral.forcing import Forcing
+from gbm_plugin.spectral.forcing import Forcing, Unforced
 from gbm_plugin.spectral.modes import Modes
 from gbm_plugin.spectral.slabs import Slabs
 from gbm_plugin.spectral.stepping import AdamsBashforth3, RungeKutta4
 from gbm_plugin.statistics import turbulence
 
 SCHEMES = {"ab3": AdamsBashforth3, "rk4": RungeKutta4}
+STABLE = {"ab3": 0.34, "rk4": 1.35}  # Courant numbers, of the shortest wave along the fastest direction
+LOOK = 10  # steps between looks at the Courant number of a fixed time step
+# energy that a step may add, beside what the force can give: that once more, and this part of what there was;
+# convection gives none, and AB3 and RK4, where they are stable, take some
+BLOWN_UP = 0.02
 
 
 class SpectralSolver:
@@ -27,8 +34,9 @@ class SpectralSolver:
     interpolation: "trilinear" (the paper's), "cubic", "quintic" or "exact", for `sample`; device: "cpu" or "gpu" (needs
     CuPy).
 
-    The fluid starts at rest at time 0. Raises ValueError for a bad value, FloatingPointError when the
-    velocity becomes infinite or NaN.
+    The fluid starts at rest at time 0. A fixed step beyond those limits is worth a warning: RK4 then
+    damps what it should carry. Raises ValueError for a bad value, FloatingPointError where the flow blows up: in the
+    step in which it has more energy than its force can give.
     """
 
     def __init__(
@@ -55,13 +63,14 @@ class SpectralSolver:
         one_of("interpolation", interpolation, interpolate.WORDS)
         self.modes = Modes(cells, box)
         self.operators = _operators(device, self.modes, viscosity, precision, threads)
-        self.forcing = Forcing() if forcing is None else forcing
+        self.forcing = Unforced() if forcing is None else forcing
         self.forcing.bind(self.operators)
         self.interpolation = interpolation
         self.time, self.step = 0.0, 0
         self.time_step, self.cfl = time_step, cfl
         self._threads = threads
         self._stepper = SCHEMES[scheme](self.operators)
+        self._scheme, self._warned = scheme, False
         self._u = self.operators.zeros()
         self._energy = 0.0
         self._points: Array | None = None  # modes of the point forces
@@ -145,19 +154,31 @@ class SpectralSolver:
     def advance(self, steps: int = 1) -> None:
         """Take time steps."""
         for _ in range(steps):
-            h, self._energy = self._stepper.step(
-                self._u, self._energy, self.time, self._evaluate, self._choose
-            )
+            before = self._energy
+            h, self._energy = self._stepper.step(self._u, before, self.time, self._evaluate, self._choose)
             self.operators.close(self._u)
-            self.forcing.advance(h)
             self.time += h
             self.step += 1
             self._discard_fields()
-            if not np.isfinite(self._energy):
-                place = f"after step {self.step}, t = {self.time:.6g}, time step {h:.3g}"
-                raise FloatingPointError(
-                    f"velocity is not finite {place}: use a shorter step or a weaker force"
-                )
+            self._check_step(before, h)
+            self.forcing.advance(h)
+
+    def _check_step(self, before: float, h: float) -> None:
+        """FloatingPointError where the energy has grown by more than the force can give."""
+        gain = self.forcing.reach(max(before, 0.0), h) - before
+        if self._energy <= before + 2 * gain + BLOWN_UP * before + self._rounding:
+            return
+        place = f"in step {self.step}, t = {self.time:.6g}, time step {h:.3g}"
+        grown = f"its energy grows from {before:.3g} to {self._energy:.3g}, the force can give {gain:.3g}"
+        if not np.isfinite(self._energy):
+            grown = "its velocity is not finite"
+        raise FloatingPointError(f"the flow blows up {place}: {grown}; use a shorter step or a weaker force")
+
+    @property
+    def _rounding(self) -> float:
+        """Of the energy of fluctuations, beside that of the mean."""
+        mean = self.operators.host(self._u[:, 0, 0, 0])
+        return 1e3 * np.finfo(self._u.dtype).eps * float((abs(mean) ** 2).sum())
 
     def spectrum(self) -> tuple[NDArray, NDArray]:
         """k (S,) and E(k) (S,), eq. (16) of the paper; see `statistics.turbulence.energy_spectrum`."""
@@ -291,19 +312,32 @@ class SpectralSolver:
     def _evaluate(self, u: Array, out: Array, energy: float) -> None:
         """du/dt without viscosity."""
         linear = self.forcing.rate(energy)
-        self.operators.nonlinear(u, out, linear, want_speed=self.cfl is not None)
+        look = self.cfl is not None or (self.step % LOOK == 0 and not self._warned)
+        self.operators.nonlinear(u, out, linear, want_speed=look)
         self.forcing.add(out)
         if self._points is not None:
             out += self._points
 
     def _choose(self) -> float:
         """The length of the step that begins, the velocity at its start having been seen."""
-        if self.cfl is None:
-            return self.time_step
         speed = self.operators.max_speed
+        if self.cfl is None:
+            self._judge(speed)
+            return self.time_step
         if not speed > 0:
             raise ValueError("a time step cannot be chosen by cfl in a fluid at rest: set a velocity first")
         return self.cfl * self.box / self.cells / speed
+
+    def _judge(self, speed: float | None) -> None:
+        """A warning, once, where the step is longer than the scheme is stable for."""
+        courant = (speed or 0.0) * self.time_step * self.cells / self.box
+        if courant > STABLE[self._scheme]:
+            self._warned = True
+            warnings.warn(
+                f"the Courant number is {courant:.2g} at t = {self.time:.6g}, time step {self.time_step:.3g}: "
+                f"{self._scheme} is stable below {STABLE[self._scheme]}; take a shorter step",
+                stacklevel=5,
+            )
 
     def _dissipation(self) -> float:
         return 2 * self.viscosity * float((self.modes.k_squared * self._mode_energy()).sum())

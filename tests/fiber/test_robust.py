@@ -127,6 +127,53 @@ def test_ab3_refuses_absurd_numbers_of_substeps():
         simulate(Fibers(GOOD, 1e9, 1e-3), STILL, 0.1, 1.0, integrator="ab3")
 
 
+@pytest.mark.parametrize("rate", [10.0, 100.0, 1e8])
+def test_ab3_refuses_a_flow_that_it_cannot_follow(rate):
+    """Turning by many radians a step, it would be stable, of exact length, and anywhere."""
+    shear = LinearFlow([[0, rate, 0], [0, 0, 0], [0, 0, 0]])
+    with pytest.raises(ValueError, match=r"ab3 loses fiber|changes too fast for a step of 1"):
+        simulate(Fibers(bent(4, 20, 0.1), 1e-4, 1e-2), shear, 1.0, 3.0, integrator="ab3")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("integrator", ["ab3", "implicit", "auto"])
+def test_a_folded_discrete_rod_is_refused_or_moved(integrator):
+    """At a fold cos²(θ/2), by which the stable step shrinks, is 0."""
+    links = np.repeat([[[1.0, 0, 0], [-1.0, 0, 0]]], 4, axis=1)
+    fibers = Fibers(positions_of(links, 0.1), 1e-4, 1e-2, curvature_law="discreteRod")
+    if integrator == "ab3":
+        with pytest.raises(ValueError, match="take the implicit integrator"):
+            simulate(fibers, STILL, 0.01, 0.02, integrator=integrator)
+    else:
+        path = simulate(fibers, STILL, 0.01, 0.02, integrator=integrator)
+        np.testing.assert_allclose(path.positions[-1], fibers.positions, atol=1e-12)  # no binormal, no moment
+
+
+def test_a_fiber_beyond_double_precision_is_named():
+    """Carried off exponentially, its beads end in one place by rounding; no step is short enough then."""
+    stretch = LinearFlow(np.diag([100.0, -50, -50]))
+    shapes = bent(2, 5, 0.1) + np.array([[[0, 0, 0]], [[1.0, 0, 0]]])
+    with pytest.raises(
+        FloatingPointError, match=r"fiber 1 is more than 4.5e\+08 from the origin at time 0.1"
+    ):
+        simulate(Fibers(shapes, 1e-4, 1e-2), stretch, 1.0, 3.0)
+
+
+def test_stiffness_without_bounds_is_refused():
+    with pytest.raises(ValueError, match="cannot be computed with"):
+        Fibers(GOOD, 1e300, 1.0)
+    with pytest.raises(
+        FloatingPointError, match=r"fiber 0 needs steps below .* too stiff for so bent a shape"
+    ):
+        simulate(Fibers(GOOD, 1e60, 1.0), STILL, 0.1, 1.0)
+
+
+def test_errors_name_the_family():
+    families = [Fibers(GOOD, 1.0, 1.0), Fibers(GOOD, 1e9, 1e-3)]
+    with pytest.raises(ValueError, match=r"^family 1: ab3 would need"):
+        simulate(families, STILL, 0.1, 1.0, integrator="ab3")
+
+
 def test_the_loop_is_guarded():
     stepper = Stepper(Fibers(GOOD, 1.0, 1.0))
     rest = np.zeros(GOOD.shape)

@@ -142,3 +142,21 @@ def test_wrong_entries_are_named(tmp_path, option, message):
     assert start_solver(path).wait() != 0
     text = fatal_message(path / "log.pimpleFoam")
     assert message in text and "fvOptions" in text
+
+
+@pytest.mark.parametrize("application", ["pimpleFoam", "boxFoam"])
+def test_a_list_of_equal_velocities_has_nothing_to_force(application, tmp_path):
+    """Which no reader of the case sees: A = P/2k would amplify its rounding."""
+    power = "linearForcing { type linearForcing; mode constantPower; power 1; }"
+    make_case(
+        tmp_path / "case",
+        cells=8,
+        steps=2,
+        fv_options=power,
+        initial=f"field modes; modes ({UNIFORM});",
+        application=application,
+    )
+    control = tmp_path / "case/system/controlDict"
+    control.write_text(control.read_text().split("functions")[0])
+    assert start_solver(tmp_path / "case").wait() != 0
+    assert "nothing to force at time" in (tmp_path / f"case/log.{application}").read_text()

@@ -95,14 +95,32 @@ Foam::scalar Foam::fv::linearForcing::power(const flowStatistics& s) const
 }
 
 
+void Foam::fv::linearForcing::refuseRest(const flowStatistics& now) const
+{
+    const scalar rounding = 0.5*magSqr(meanTolerance*now.mean);
+
+    if (mode_ == mode::constantPower && now.k <= max(rounding, VSMALL))
+    {
+        FatalErrorInFunction
+            << "the forcing " << option::name() << " has nothing to force at"
+            << " time " << mesh_.time().timeName() << ": k = " << now.k
+            << " beside a mean velocity of " << mag(now.mean)
+            << "; power = " << strength_ << " needs a flow that fluctuates"
+            << exit(FatalError);
+    }
+}
+
+
 void Foam::fv::linearForcing::choose(const flowStatistics& now)
 {
+    refuseRest(now);
     A_ = coefficient(energyAtEnd(now.k));
 }
 
 
 void Foam::fv::linearForcing::follow(const flowStatistics& now)
 {
+    refuseRest(now);
     A_ = coefficient(now.k);
 }
 
