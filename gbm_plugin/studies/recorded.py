@@ -131,7 +131,7 @@ class FinishedRun:
         self, case: Path | str, since: float | None = None, records: int = 400, families: Sequence[str] = ()
     ):
         self.case = Path(case)
-        self.label = _label(self.case)
+        self.label = run_label(self.case)
         if not self.case.is_dir():
             raise FileNotFoundError(f"there is no folder {case}")
         if not results(self.case).is_dir():
@@ -258,7 +258,7 @@ class FinishedRun:
         self.close()
 
 
-def _label(case: Path) -> str:
+def run_label(case: Path) -> str:
     path = case.resolve()
     return f"{path.parent.name}/{path.name}" if path.name in ENGINES else path.name
 

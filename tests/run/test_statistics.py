@@ -10,6 +10,7 @@ import pytest
 from gbm_plugin.output.recording import open_recording
 from gbm_plugin.output.statistics import read_statistics
 from gbm_plugin.statistics.running import Running
+from gbm_plugin.studies.paper import gathered
 
 from conftest import gbm, make_case, run_case, set_entry
 
@@ -102,3 +103,19 @@ def test_a_wrong_entry_is_named(tmp_path, entry):
     case = make(tmp_path / "case", asked=f"statistics {{ {entry} }}\n")
     done = gbm("run", case, *SPECTRAL)
     assert done.returncode == 1 and entry.split()[0] in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_the_study_of_them_has_every_family(tmp_path):
+    case = make(tmp_path / "case", steps=20)
+    run_case(case, *SPECTRAL)
+    result = gathered.run([case / "spectral"])
+    soft, short = result["rows"]
+    assert short["R2"] == pytest.approx(1) and "curvature" not in short
+    assert (
+        soft["R2"]
+        == read_statistics(case / "spectral" / FIBERS).families["soft"].averages["R2"].estimate().value
+    )
+    assert soft["R2_rms"] >= 0 and soft["turning_time"] > 0
+    assert len(gathered.table(result).splitlines()) == 4 and gathered.draw(result)
+    with pytest.raises(FileNotFoundError, match="asks for it"):
+        gathered.run([case])

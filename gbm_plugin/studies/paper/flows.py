@@ -24,6 +24,7 @@ from ...report.style import new_figure
 from ...statistics.ensemble import Estimate, fiber_average
 from ...statistics.series import TimeSeries
 from ...statistics.turbulence import energy_spectrum, field_statistics
+from ..recorded import run_label
 from ..study import option, steps
 
 KEPT = tuple(Path(f"docs/results/spectral_flow_I_{n}.csv") for n in (64, 128))
@@ -118,12 +119,9 @@ def _of_folder(case: Path, settle: float, most: int) -> dict:
     columns |= {name: np.array(values) for name, values in fields.items() if values}
     spectrum = np.column_stack([k, np.mean(spectra, axis=0)]) if spectra else np.zeros((0, 2))
     own = {q: columns[column] for q, (column, *_) in QUANTITIES.items() if column in columns}
-    return _summary(_name(case), mesh.cells[0], table["Time"][late], own, spectrum, len(names), mesh.size[0])
-
-
-def _name(case: Path) -> str:
-    case = case.resolve()
-    return case.parent.name if case.name in ("spectral", "stored") else case.name
+    return _summary(
+        run_label(case), mesh.cells[0], table["Time"][late], own, spectrum, len(names), mesh.size[0]
+    )
 
 
 def _summary(name, cells, times, columns, spectrum, fields, box=2 * np.pi) -> dict:

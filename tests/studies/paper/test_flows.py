@@ -34,7 +34,7 @@ def test_means_are_those_of_the_run(case):
     assert means["u'"] == pytest.approx(table["uPrime"][late].mean())
     reynolds = np.sqrt(15 / (NU * table["epsilonBudget"][late])) * table["uPrime"][late] ** 2
     assert means["Re_λ"] == pytest.approx(reynolds.mean())
-    assert found["cells"] == 16 and found["fields"] == 4 and found["name"] == "case"
+    assert found["cells"] == 16 and found["fields"] == 4 and found["name"] == "case/spectral"
     assert found["duration"] == pytest.approx(0.62)
 
     solver = SpectralSolver(16, NU, forcing=EswaranPope(time_scale=0.5, **FORCE), time_step=0.02)
