@@ -34,6 +34,12 @@ inlined = njit(nogil=True, error_model="numpy", forceinline=True)
 woven = njit(nogil=True, error_model="numpy", inline="always")  # into the kernel, before types are known
 
 
+@inlined
+def part_of(share, shares, count):
+    """First and last of the numbers below count that are this share's, where neighbours belong together."""
+    return share * count // shares, (share + 1) * count // shares
+
+
 def kernel(function=None, **options):
     """function compiled by Numba and kept; options as those of numba.njit."""
     if function is None:

@@ -9,7 +9,7 @@ import numpy as np
 from .fiber import Fibers, instant_rates
 from .fiber import prepare as prepare_fibers
 from .fiber.model import MOBILITIES
-from .flow import grid
+from .flow import TaylorGreen, grid
 from .spectral import LinearForcing, SpectralSolver
 from .spectral.interpolation import WORDS
 
@@ -23,6 +23,7 @@ def prepare() -> None:
     for mobility in MOBILITIES:
         instant_rates(fibers, 0.0, 0.0, mobility)
     fibers.self_contacts.sum()
+    TaylorGreen(1.0, 1.0).sample(np.zeros((1, 3)), 0.0)
     _prepare_grid()
     _prepare_spectral()
 

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "gbm_plugin"
 
 # from the ground up; folders of one line do not know each other, but for the words of the fiber model
 FLOORS = [
-    {"arrays", "errors", "files", "scales", "compiled", "sampling", "signals"},
+    {"arrays", "errors", "files", "scales", "compiled", "sampling", "signals", "threads"},
     {"fiber", "flow", "case", "statistics"},
     {"spectral", "output"},
     {"report", "fleet", "prepare"},

@@ -112,7 +112,7 @@ def plan(ages: list[float], step: float, flow: np.ndarray) -> Plan:
         np.full(count, step), np.zeros(count, bool), np.zeros((count, 3)), np.zeros(count), np.zeros((count, 3)), flow
     )  # fmt: skip
     ages = list(ages)
-    for s in range(count):
+    for s in range(min(count, 3)):
         if len(ages) < 2:
             made.start[s] = True
         else:
@@ -126,7 +126,20 @@ def plan(ages: list[float], step: float, flow: np.ndarray) -> Plan:
             made.magnus[s] = step**3 / (12 * p)
             made.error[s] = row - (step + h2 / p, -h2 / p, 0)
         ages = [step, *(age + step for age in ages[:1])]
+    for rows in (made.weights, made.magnus, made.error):
+        rows[3:] = rows[2:3]  # two sub-steps behind it, each is as the one before
     return made
+
+
+def sample_weights(times: np.ndarray, step: float, count: int) -> np.ndarray:
+    """(count, STAGES, SAMPLES) weights of samples at these times, at the stages of sub-steps from time 0 on."""
+    at = (np.arange(count)[:, None] + np.arange(STAGES) / STAGES) * step
+    weights = np.zeros((count, STAGES, SAMPLES))
+    for j, own in enumerate(times):
+        weights[..., j] = 1.0
+        for other in (t for m, t in enumerate(times) if m != j):
+            weights[..., j] *= (at - other) / (own - other)
+    return weights
 
 
 @inlined

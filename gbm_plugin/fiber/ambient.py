@@ -6,9 +6,9 @@ import numpy as np
 
 from ..compiled import kernel
 from ..sampling import lagrange_weights
+from ..threads import COPYING, in_shares
 from .layout import pack, unpack
 from .simd import LANES
-from .threads import COPYING, in_shares
 
 SAMPLES = 3  # in the polynomial in time
 KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..compiled import inlined, kernel, only_read
-from .threads import in_shares
+from ..threads import in_shares
 
 
 @inlined

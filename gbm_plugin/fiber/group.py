@@ -43,7 +43,8 @@ class Group:
     def positions(self) -> NDArray:
         """(B, 3), to be read only."""
         if self._positions is None:
-            self._positions = np.concatenate([s.positions.reshape(-1, 3) for s in self.steppers])
+            parts = [s.positions.reshape(-1, 3) for s in self.steppers]
+            self._positions = parts[0] if len(parts) == 1 else np.concatenate(parts)
             self._positions.flags.writeable = False
         return self._positions
 

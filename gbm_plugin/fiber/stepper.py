@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..sampling import lagrange_weights
+from ..threads import COPYING, available, in_shares
 from . import ab3, implicit
 from .ambient import SAMPLES, Ambient
 from .bending import FOLD
@@ -23,11 +23,11 @@ from .reaction import scratch_rows as reaction_rows
 from .simd import LANES
 from .state import check_state
 from .strain import with_strain
-from .threads import COPYING, available, in_shares
 
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
+AFFORDABLE = 5  # sub-steps of ab3 that cost less than an implicit step (docs/accuracy.md)
 SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open within 1e-14
 LOST = 0.5  # [rad] estimated error of a sub-step of ab3 beyond which its links point nowhere in particular
 
@@ -36,8 +36,9 @@ class Stepper:
     """Time stepping of one family, fed with one sample of the flow at the beads per step.
 
     options: of model.MotionOptions. integrator "ab3": third order, sub-steps within eq. (10); "implicit": second, any
-    step; "auto": ab3 where eq. (10) allows the whole step and the error estimate too, else implicit, fiber by fiber.
-    ab3 has no tolerance: its sub-steps are stable, and as accurate as they happen to be; what is lost is refused.
+    step; "auto": ab3 where a few sub-steps within eq. (10) do and its error estimate allows, else implicit, fiber by
+    fiber. ab3 has no tolerance: its sub-steps are stable, and as accurate as they happen to be; what is lost is
+    refused.
     tolerance (for implicit and auto; None: 1e-3): bead displacement over fiber length. Every accepted step of
     every fiber is held to a tenth of it, in the rms rotation of its links, so that a relaxation of several
     steps stays within. repulsion: below about 1/time_step.
@@ -267,8 +268,8 @@ class Stepper:
             self._followed(self._explicit(count), count)
             return
         everyone = np.arange(self.fibers.count)
-        if count == 1:
-            error = self._explicit(1)
+        if count <= AFFORDABLE:
+            error = self._explicit(count)
             self._implicit(everyone[~(error <= self.local_tolerance)])
         else:
             self._ages = []
@@ -289,10 +290,6 @@ class Stepper:
         """All fibers by ab3 in count sub-steps; returns the error estimates (F,)."""
         fibers, h = self.fibers, self._length / count
         times, (velocity, rotation) = self._ambient.polynomial(self._start)
-        flow = np.zeros((count, ab3.STAGES, SAMPLES))
-        for s in range(count):
-            for stage in range(ab3.STAGES):
-                flow[s, stage, : len(times)] = lagrange_weights(times, (s + stage / ab3.STAGES) * h)
         error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
         new, old = self._spare
         in_shares(
@@ -300,7 +297,7 @@ class Stepper:
             self._beads,
             self._material,
             Samples(velocity, rotation, times),
-            ab3.plan(self._last_ages, h, flow),
+            ab3.plan(self._last_ages, h, ab3.sample_weights(times, h, count)),
             ab3.History(self._last, *self._last_rates),
             ab3.History(self._state, new, old),
             self._scratch,

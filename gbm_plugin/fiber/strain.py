@@ -13,7 +13,7 @@ import numpy as np
 
 from ..compiled import kernel, only_read
 from ..sampling import rotation_of
-from .threads import in_shares
+from ..threads import in_shares
 
 
 @kernel

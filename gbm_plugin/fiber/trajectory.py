@@ -132,7 +132,7 @@ class _Run:
     def positions(self) -> list[NDArray]:
         """(F, N, 3) of each family, of fibers that left the flow where they did."""
         return [
-            np.where(left[:, None, None], resting, now)
+            np.where(left[:, None, None], resting, now) if left.any() else now
             for left, resting, now in zip(self.left, self._resting, self.group.by_family, strict=True)
         ]
 
@@ -145,7 +145,9 @@ class _Run:
     def sample(self) -> None:
         """The flow at the beads now."""
         positions = self._inside()
-        beads = np.concatenate([part.reshape(-1, 3) for part in positions])
+        beads = self.group.positions
+        if any(left.any() for left in self.left):
+            beads = np.concatenate([part.reshape(-1, 3) for part in positions])
         velocity, extra = self.flow.sample(beads, self.time, self.group.need)
         if any(left.any() for left in self.left):
             moving = ~np.concatenate(

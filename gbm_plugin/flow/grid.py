@@ -3,19 +3,22 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel, only_read, part
+from ..compiled import kernel, only_read, part, part_of
+from ..threads import in_shares
 
 LAGRANGE = {"cubic": 4, "quintic": 6}  # nodes in each direction
 WORDS = ("trilinear", *LAGRANGE)
 BOUNDED = ("trilinear", "cubic")  # those for a field that is not periodic
 LEAST_BOUNDED = 4  # values in each direction of such a field
+COST = {"trilinear": 0.3, "cubic": 3.0, "quintic": 10.0}  # of a point, in steps of a bead
 
 
 @kernel
-def trilinear(nodes, points, out):
+def trilinear(share, shares, nodes, points, out):
     """out (P, m) from nodes (nx, ny, nz, m) at points (P, 3) in units of cells. Error O(h^2), continuous."""
     nx, ny, nz, fields = nodes.shape
-    for p in range(points.shape[0]):
+    first, last = part_of(share, shares, points.shape[0])
+    for p in range(first, last):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
         a, b, c = x - i, y - j, z - k
@@ -64,13 +67,14 @@ def _slopes(x, slopes, scale):
 
 
 @kernel
-def lagrange(nodes, points, scale, out):
+def lagrange(share, shares, nodes, points, scale, out):
     """As `trilinear`, for m = 3, 6, ..., with Lagrange polynomials through the nearest nodes in each direction, as
     many as `scale` has: error O(h^width)."""
     nx, ny, nz, fields = nodes.shape
     width = scale.size
     weights, places = np.empty((3, width)), np.empty((3, width), np.intp)
-    for p in range(points.shape[0]):
+    first, last = part_of(share, shares, points.shape[0])
+    for p in range(first, last):
         _nearest(points[p, 0], nx, scale, weights[0], places[0])
         _nearest(points[p, 1], ny, scale, weights[1], places[1])
         _nearest(points[p, 2], nz, scale, weights[2], places[2])
@@ -104,14 +108,16 @@ def for_sampling(fields: NDArray) -> NDArray:
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(fields, 0, -1)), -1, 0)
 
 
-def on_grid(word: str, fields: NDArray, points: NDArray) -> NDArray:
+def on_grid(word: str, fields: NDArray, points: NDArray, threads: int | None = None) -> NDArray:
     """Interpolate fields (m, nx, ny, nz), best in the order of `for_sampling`, nodes at 0, 1, 2, ..., at points (P, 3)
-    in units of cells, which need not lie inside the box: (P, m). m is a multiple of 3, or the word is trilinear."""
+    in units of cells, which need not lie inside the box: (P, m). m is a multiple of 3, or the word is trilinear.
+    threads: at most so many; None: all."""
+    work = COST[word] * len(points)
     out, nodes = np.empty((len(points), len(fields))), only_read(np.moveaxis(fields, 0, -1))
     if word == "trilinear":
-        trilinear(nodes, only_read(points), out)
+        in_shares(trilinear, work, nodes, only_read(points), out, most=threads)
     else:
-        lagrange(nodes, only_read(points), _scale(word), out)
+        in_shares(lagrange, work, nodes, only_read(points), _scale(word), out, most=threads)
     return out
 
 
@@ -165,12 +171,13 @@ def spread(word: str, values: NDArray, points: NDArray, cells: tuple[int, int, i
 
 
 @kernel
-def _lagrange_slopes(nodes, points, scale, out):
+def _lagrange_slopes(share, shares, nodes, points, scale, out):
     """out (P, m, 3): derivatives of the interpolant of `lagrange` in units of cells."""
     width = scale.size
     weights, slopes = np.empty((3, width)), np.empty((3, width))
     places = np.empty((3, width), np.intp)
-    for p in range(points.shape[0]):
+    first, last = part_of(share, shares, points.shape[0])
+    for p in range(first, last):
         for d in range(3):
             _nearest(points[p, d], nodes.shape[d], scale, weights[d], places[d])
             _slopes(points[p, d], slopes[d], scale)
@@ -195,7 +202,7 @@ def lagrange_gradient(word: str, velocity: NDArray, points: NDArray, spacing: ND
     `LAGRANGE`. One order below that of the velocity."""
     out = np.empty((len(points), 3, 3))
     nodes = only_read(np.moveaxis(velocity, 0, -1))
-    _lagrange_slopes(nodes, only_read(points), _scale(word), out)
+    in_shares(_lagrange_slopes, 2 * COST[word] * len(points), nodes, only_read(points), _scale(word), out)
     return out / spacing
 
 

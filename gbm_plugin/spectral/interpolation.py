@@ -9,9 +9,9 @@ from ..flow import grid
 WORDS = (*grid.WORDS, "exact")
 
 
-def on_grid(word: str, fields: NDArray, positions: NDArray, box: float) -> NDArray:
+def on_grid(word: str, fields: NDArray, positions: NDArray, box: float, threads: int = 1) -> NDArray:
     """Interpolate fields (m, n, n, n) at positions (P, 3), which need not lie inside the box: (P, m)."""
-    return grid.on_grid(word, fields, positions * (fields.shape[1] / box))
+    return grid.on_grid(word, fields, positions * (fields.shape[1] / box), threads)
 
 
 def spread_on_grid(word: str, values: NDArray, positions: NDArray, box: float, cells: int) -> NDArray:

@@ -369,7 +369,7 @@ class SpectralSolver:
         if self.interpolation == "exact":
             return interpolate.fourier_sum(self.operators.host(modes()), points, self.box, self._threads)
         fields = self.operators.host(self._physical(name, modes))
-        return interpolate.on_grid(self.interpolation, fields, points, self.box)
+        return interpolate.on_grid(self.interpolation, fields, points, self.box, self._threads)
 
 
 def _operators(device: str, modes: Modes, viscosity: float, precision: str, threads: int) -> Arrays:

@@ -24,9 +24,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..fiber import Fibers, Stepper
-from ..fiber.threads import limited_to
 from ..flow import TaylorGreen
 from ..statistics.buckling import OUTSIDE, REGIONS, Tracks
+from ..threads import limited_to
 from .study import steps
 
 RATE = np.pi  # S = πU₀/W

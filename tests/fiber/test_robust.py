@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from gbm_plugin import Fibers, simulate
 from gbm_plugin.fiber import Stepper
-from gbm_plugin.fiber.threads import limited_to
 from gbm_plugin.flow import LinearFlow
+from gbm_plugin.threads import limited_to
 
 from fiber_cases import WavyFlow, bent, crooked, positions_of, rpy_matrix, run_once_per_step
 

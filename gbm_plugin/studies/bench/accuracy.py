@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
-from ...fiber.threads import limited_to
+from ...threads import limited_to
 from ..study import option, steps
 
 PARTS = ("integrators", "beads", "mobility", "step")

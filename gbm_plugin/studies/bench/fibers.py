@@ -11,8 +11,8 @@ import time
 import numpy as np
 
 from gbm_plugin.fiber import Fibers, simulate
-from gbm_plugin.fiber.threads import available, limited_to
 from gbm_plugin.flow import TaylorGreen
+from gbm_plugin.threads import available, limited_to
 
 from ..study import option
 
