@@ -25,7 +25,7 @@ from ...statistics.densities import density, mean_pairwise, own_noise, quantiles
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import mean_curvature
 from ..recorded import Family, add_run_arguments, finished_runs, flow_lines
-from ..study import steps
+from ..study import compact, steps
 
 BENT = 3.0  # L/l_p from which fibers buckle
 BINS = 40
@@ -37,10 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class Sample:
-    """The mean curvatures (T, F) [1/m] of a family."""
+    """The mean curvatures (T, F) [1/m] of a family; flow: a number that runs in the same flow have in common."""
 
     family: Family
     values: NDArray
+    flow: int
 
     @property
     def method(self) -> tuple:
@@ -50,9 +51,9 @@ class Sample:
         return (self.family.run, self.family.time_step, *(model.get(name) for name in names))
 
     @property
-    def fiber(self) -> tuple[float, float]:
-        """What it is, beside its beads: the same in all runs."""
-        return float(f"{self.family.length:.6g}"), self.family.stiffness
+    def fiber(self) -> tuple[float, float, int]:
+        """What it is, beside its beads, and in which flow: the same in all runs of that flow."""
+        return float(f"{self.family.length:.6g}"), self.family.stiffness, self.flow
 
     @property
     def collapses(self) -> bool:
@@ -66,10 +67,11 @@ def run(
     samples, flows = [], []
     for finished in finished_runs(cases, since, records, families):
         flows.append(finished.summary())
+        flow = next(i for i, earlier in enumerate(flows) if _same_flow(earlier, flows[-1]))
         for family in steps(finished.families, len(finished.families), finished.label):
             if family.beads > 2:
                 (values,) = finished.measure(family, lambda x, a=family.radius: mean_curvature(x, a))
-                samples.append(Sample(family, values))
+                samples.append(Sample(family, values, flow))
     return {
         "runs": flows,
         "rows": [_row(s) for s in samples],
@@ -78,6 +80,11 @@ def run(
         "collapse": _collapse([s for s in samples if s.collapses]),
         "densities": [_density(s) for s in samples if s.collapses],
     }
+
+
+def _same_flow(one: dict, other: dict) -> bool:
+    """Whether two runs are of one flow: their scales are alike, whatever solved it."""
+    return one["viscosity"] == other["viscosity"] and 0.6 < one["dissipation"] / other["dissipation"] < 1.6
 
 
 def _row(sample: Sample) -> dict:
@@ -161,8 +168,8 @@ def _density(sample: Sample) -> dict:
         "family": family.name,
         "l_p": family.persistence,
         "bending_stiffness": family.stiffness,
-        "centres": ((edges[1:] + edges[:-1]) / 2).tolist(),
-        "density": density(sample.values * scale, edges).tolist(),
+        "centres": compact((edges[1:] + edges[:-1]) / 2),
+        "density": compact(density(sample.values * scale, edges)),
     }
 
 

@@ -24,7 +24,7 @@ from ...statistics.fibers import end_to_end, mean_curvature
 from ...statistics.orientation import AXES, alignments, directions, tumbling, vorticity
 from ..fields import fields_of
 from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
-from ..study import option, steps
+from ..study import compact, option, steps
 
 STRAIGHT = 0.8  # R/L, the paper's limit of buckling
 LAGS = 60  # kept of a correlation
@@ -89,9 +89,9 @@ def _moved(finished: FinishedRun, family: Family) -> tuple[dict, dict]:
         "run": family.run,
         "family": family.name,
         "L_over_l_p": _number(family.stretch),
-        "lag_over_tau": (np.arange(most + 1) * finished.spacing / tau)[::stride].tolist(),
-        "R": memory[::stride].tolist(),
-        "curvature": bending[::stride].tolist(),
+        "lag_over_tau": compact((np.arange(most + 1) * finished.spacing / tau)[::stride]),
+        "R": compact(memory[::stride]),
+        "curvature": compact(bending[::stride]),
     }
     return row, curve
 

@@ -22,7 +22,7 @@ from ...statistics.densities import density, distance_to
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import end_to_end, gyration_radius
 from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
-from ..study import steps
+from ..study import compact, steps
 
 BINS = 40
 MARKERS = "osD^vP*X"
@@ -100,11 +100,11 @@ def _densities(family: Family, vectors: NDArray, gyration: NDArray) -> dict:
         "family": family.name,
         "L_over_l_p": family.stretch if np.isfinite(family.stretch) else None,
         "beads": family.beads,
-        "square": flat.mean(),
-        "edges": edges.tolist(),
-        "projected": density(flat, edges).tolist(),
-        "gyration_edges": own.tolist(),
-        "gyration": density(gyration, own).tolist(),
+        "square": float(flat.mean()),
+        "edges": compact(edges),
+        "projected": compact(density(flat, edges)),
+        "gyration_edges": compact(own),
+        "gyration": compact(density(gyration, own)),
     }
 
 

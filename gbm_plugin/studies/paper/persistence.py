@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ...report.style import COLOURS, new_figure
 from ...statistics.ensemble import fiber_average
@@ -25,6 +26,7 @@ from ..study import steps
 
 PAPER, EXPERIMENT = 3.0, 2.0
 MARKERS = "osD^vP*X"
+BENT = 5.0  # L/l_p from which a family is bent for sure
 LEAST = 1.0  # L/l_p of a family that can tell γ: below, it is a rod
 
 
@@ -66,9 +68,34 @@ def run(
             average = fiber_average(values)
             point = Point(family, average.value, average.error or 0.0, factor, finished.flow.forcing)
             points.append(point)
-            measured.append(_row(point))
+            measured.append(_row(point) | {"L_over_eta": family.contour / finished.flow.kolmogorov_length})
     fits = list(_fits([p for p in points if p.family.stiffness > 0]))
-    return {"runs": flows, "rows": measured, "fits": fits}
+    return {"runs": flows, "rows": measured, "fits": fits, "trend": _trend(measured)}
+
+
+def _trend(measured: list[dict]) -> dict | None:
+    """Exponents of γ ∝ (L/η)^a (L/l_p)^b over the families that are bent: both 0 if eq. (19) with l_p were all. Errors
+    by leaving out one family after the other."""
+    bent = [r for r in measured if r["fitted"] and r["gamma"] and r["L_over_l_p"] >= BENT]
+    if len(bent) < 5:
+        return None
+    x = np.log([[r["L_over_eta"], r["L_over_l_p"], np.e] for r in bent])
+    y = np.log([r["gamma"] for r in bent])
+
+    def solve(rows: NDArray) -> NDArray:
+        return np.linalg.lstsq(x[rows], y[rows], rcond=None)[0][:2]
+
+    every = np.arange(len(y))
+    parts = np.array([solve(every != i) for i in every])
+    error = np.sqrt((len(y) - 1) / len(y) * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    whole = solve(every >= 0)
+    return {
+        "families": len(bent),
+        "exponent_of_L_over_eta": float(whole[0]),
+        "error_of_L_over_eta": float(error[0]),
+        "exponent_of_L_over_l_p": float(whole[1]),
+        "error_of_L_over_l_p": float(error[1]),
+    }
 
 
 def _row(point: Point) -> dict:
@@ -103,6 +130,8 @@ def _fits(points: list[Point]) -> Iterator[dict]:
     yield from _fitted("lengths 2aN", usual, whole=True)
     yield from _fitted("L/l_p up to 5", [p for p in usual if p.family.stretch <= 5])
     yield from _fitted("L/l_p from 5 on", [p for p in usual if p.family.stretch >= 5])
+    yield from _fitted("L/l_p from 5 to 10", [p for p in usual if 5 <= p.family.stretch < 10])
+    yield from _fitted("L/l_p from 10 on", [p for p in usual if p.family.stretch >= 10])
     for beads in sorted({p.family.beads for p in usual}):
         yield from _fitted(f"N = {beads}", [p for p in usual if p.family.beads == beads])
     for stiffness in sorted({p.family.stiffness for p in usual}):
@@ -167,7 +196,8 @@ def _misfit(points: list[Point], gamma: float) -> float:
 
 def rows(result: dict) -> list[dict]:
     """The lines of a CSV file: the families, then the fits."""
-    return [*result["rows"], *({"run": "fit"} | line for line in result["fits"])]
+    trend = [{"run": "trend"} | result["trend"]] if result["trend"] else []
+    return [*result["rows"], *({"run": "fit"} | line for line in result["fits"]), *trend]
 
 
 def table(result: dict) -> str:
@@ -189,6 +219,12 @@ def table(result: dict) -> str:
         error = "" if line["error"] is None else f"{line['error']:7.2g}"
         lines.append(
             f"{line['variant']:34} {line['gamma']:7.3f} {error:>7} {line['scatter']:10.3f} {line['points']:9d}"
+        )
+    if t := result["trend"]:
+        lines.append(
+            f"γ of the {t['families']} families with L/l_p ≥ {BENT:g} ∝ (L/η)^({t['exponent_of_L_over_eta']:.2f} ± "
+            f"{t['error_of_L_over_eta']:.2f}) (L/l_p)^({t['exponent_of_L_over_l_p']:.2f} ± "
+            f"{t['error_of_L_over_l_p']:.2f})"
         )
     return "\n".join(lines)
 

@@ -32,7 +32,7 @@ from ...statistics.orientation import (
 )
 from ..fields import fields_of
 from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
-from ..study import option, steps
+from ..study import compact, option, steps
 
 SETTLED, SPHERES = 0.09, 1 / 6
 STRAIGHT = 0.99  # <R²>/L² of a rod
@@ -107,13 +107,13 @@ def _row(finished: FinishedRun, family: Family) -> tuple[dict, dict]:
             float(begin.std(ddof=1) / np.sqrt(len(begin)) * now) if len(begin) > 1 else None
         )
     scale = np.interp(times[1:-1], finished.table["Time"], finished.table["epsilonBudget"])
-    stride = max(1, len(whole) // 300)
+    stride = max(1, len(whole) // 120)
     curve = {
         "run": family.run,
         "family": family.name,
         "L_over_eta": row["L_over_eta"],
-        "time_over_tau": ((times[1:-1] - times[0]) / flow.kolmogorov_time)[::stride].tolist(),
-        "tumbling": (whole.mean(axis=1) * flow.viscosity / scale)[::stride].tolist(),
+        "time_over_tau": compact(((times[1:-1] - times[0]) / flow.kolmogorov_time)[::stride]),
+        "tumbling": compact((whole.mean(axis=1) * flow.viscosity / scale)[::stride]),
     }
     return row, curve
 
