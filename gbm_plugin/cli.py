@@ -211,11 +211,18 @@ def _report(arguments) -> dict | None:
     if arguments.film:
         _film(arguments)
         return None
+    from .case.scene import read_scene
+    from .fleet.cloud import complete_clouds
     from .report.report import report
     from .report.summary import summary
     from .studies.page import make_page
 
     result = report(Path(arguments.case))
+    try:
+        result["clouds"] = complete_clouds(read_scene(arguments.case))
+    except (GbmError, ValueError) as error:  # as a dictionary that was edited since
+        result["clouds"] = []
+        result["not_drawn"].append(f"data of lagrangian/fibers: {error}")
     averages = summary(arguments.case)
     print("\n".join(averages))
     folder = Path(arguments.case) / "report"

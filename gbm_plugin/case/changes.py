@@ -16,7 +16,7 @@ WHOLE = (  # dictionaries of which every entry is physics or numerics
     "system/fvSolution",
 )
 PARTS = {"system/controlDict": ("application", "deltaT")}  # and of which only these are
-ASIDE = ("coupling", "recordInterval")  # how, and not what
+ASIDE = ("coupling", "recordInterval", "record")  # how, and not what
 
 
 def changes(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:

@@ -137,6 +137,15 @@ class Dictionary:
             raise self.fail(name, f"is '{text}': one word is needed")
         return text
 
+    def words(self, name: str, allowed: Iterable[str]) -> tuple[str, ...]:
+        """A list of words, or a single one; none where the entry is not there."""
+        value = self._get(name, [])
+        words = list(allowed)
+        for text in map(shown, value if isinstance(value, list) else [value]):
+            if text not in words:
+                raise self.fail(name, f"has '{text}'; allowed: {' '.join(words)}{nearest(text, words)}")
+        return tuple(dict.fromkeys(map(shown, value))) if isinstance(value, list) else (shown(value),)
+
     def switch(self, name: str, default: Any = _REQUIRED) -> bool:
         value = self._get(name, default)
         if name not in self._entries:

@@ -35,7 +35,7 @@ def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
     keep = control.integer("purgeWrite", 0, least=0)
     folder = _cell_bytes(scene, control) * math.prod(scene.cells or (0,)) + (STATE + CLOUD) * beads
     folders = folder * (min(writes, keep) if keep else writes)
-    recording = RECORD * beads * math.ceil(steps / scene.record_interval)
+    recording = (RECORD + 8 * len(scene.record)) * beads * math.ceil(steps / scene.record_interval)
     tables = TABLES * steps + min(MOST, LOG * steps)
     parts = {
         "time_folder": folder,

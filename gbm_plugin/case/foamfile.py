@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 
 SHAPES = {"label": (), "scalar": (), "vector": (3,)}
 CLASSES = {  # of a file that is one list: what it is a list of
-    **{"labelList": "label", "labelIOList": "label", "scalarField": "scalar", "scalarList": "scalar"},
+    **{
+        "labelList": "label",
+        "labelIOList": "label",
+        "labelField": "label",
+        "scalarField": "scalar",
+        "scalarList": "scalar",
+    },
     **{"vectorField": "vector", "vectorList": "vector", "pointField": "vector"},
 }
 _SMALL = 64 << 20  # a file of so many bytes is read, whatever it is

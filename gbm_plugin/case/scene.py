@@ -22,6 +22,7 @@ from .trust import is_inside
 TRANSPORTS = ("socket", "tcp", "file")
 START_FROM = ("latestTime", "startTime", "firstTime")
 SHAPES = ("straight", "file")
+RECORD = ("tension",)  # what a recording may have beside the positions
 
 LABEL_MAX = 2**31 - 1  # of the 32 bits that OpenFOAM's labels have at least
 
@@ -70,6 +71,7 @@ class Forcing:
     name: str
     type: str
     values: dict[str, float | str]
+    table: bool = True  # a row of the flow's averages in each step
 
     @property
     def dissipation(self) -> float | None:
@@ -116,6 +118,7 @@ class Scene:
     forcing: Forcing | None
     interpolation: str
     record_interval: int
+    record: tuple[str, ...]  # of RECORD: beside the positions
     coupling: Coupling
     families: tuple[Family, ...]
     statistics: Statistics | None = None
@@ -176,6 +179,7 @@ def read_scene(case: Path | str) -> Scene:
         forcing=forcing,
         interpolation=fibers.word("interpolation", default="trilinear"),
         record_interval=fibers.integer("recordInterval", 10, least=1),
+        record=fibers.words("record", RECORD),
         coupling=_read_coupling(fibers),
         families=_read_families(case, fibers, fluid),
         statistics=_read_statistics(fibers),
@@ -360,7 +364,7 @@ def _read_forcing(case: Path) -> Forcing | None:
         for entry in ("type", "active", "U", "phi", "libs"):
             coeffs.raw(entry, None)
         values = _linear_forcing(coeffs) if kind == "linearForcing" else _eswaran_pope(coeffs)
-        forcing = Forcing(name, kind, values)
+        forcing = Forcing(name, kind, values, coeffs.switch("writeToFile", True))
         coeffs.done()
     return forcing
 

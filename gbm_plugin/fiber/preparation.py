@@ -26,6 +26,7 @@ def prepare(feedback: bool = False, **options: Any) -> None:
         stepper.correct()
         observe()
     stepper.prediction_gap.sum()
+    stepper.tension.sum()
     if feedback:
         stepper.reaction(1.0)
     stepper.restore(stepper.state())

@@ -44,16 +44,20 @@ def instant_rates(fibers: Fibers, velocity, rotation, mobility="freeDrain"):
     velocity, rotation: ambient, at the beads (F, N, 3). The force of link i acts on bead i, its opposite on
     bead i + 1; its part along the link is the tension.
     """
-    evaluate = _EVALUATE[MotionOptions(mobility=mobility).mobility]
     state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
+    shape = (fibers.count, fibers.beads, 3)
+    ambient = (pack(np.broadcast_to(field, shape)) for field in (velocity, rotation))
+    return rates_of_blocks(fibers, state, *ambient, MotionOptions(mobility=mobility).mobility)
+
+
+def rates_of_blocks(fibers: Fibers, state, velocity, rotation, mobility):
+    """The same of fibers that have moved: links and centres, velocity, rotation in blocks (B, 3N, LANES)."""
     rates, multipliers = np.zeros_like(state), np.zeros((len(state), state.shape[1] - 3, state.shape[2]))
     work = np.zeros((work_rows(mobility, fibers.beads, implicit=False), state.shape[2]))
-    shape = (fibers.count, fibers.beads, 3)
-    velocity, rotation = (pack(np.broadcast_to(field, shape)) for field in (velocity, rotation))
-    evaluate(material(fibers), state, velocity, rotation, work, multipliers, rates)
+    _EVALUATE[mobility](material(fibers), state, velocity, rotation, work, multipliers, rates)
     drag = 6 * np.pi * fibers.viscosity * fibers.radius
     forces = drag * unpack(multipliers, (fibers.count, fibers.beads - 1, 3))
-    rates = unpack(rates, shape)
+    rates = unpack(rates, (fibers.count, fibers.beads, 3))
     return rates[:, :-1], rates[:, -1], forces
 
 

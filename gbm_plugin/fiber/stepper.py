@@ -17,7 +17,7 @@ from .contact import repulsion_velocity
 from .fibers import TOUCHING, Fibers, positive
 from .layout import bead_positions, pack, unpack
 from .model import MotionOptions
-from .rates import material
+from .rates import material, rates_of_blocks
 from .reaction import EXERT, Reaction, implicit_sigma, powers_of
 from .reaction import scratch_rows as reaction_rows
 from .simd import LANES
@@ -101,6 +101,30 @@ class Stepper:
         positions = np.empty((self.fibers.count, self.fibers.beads, 3))
         in_shares(bead_positions, COPYING * self._beads, self._state, 2 * self.fibers.radius, positions)
         return positions
+
+    @property
+    def tension(self) -> np.ndarray:
+        """(F, N−1) [N] of each link now, positive where it is pulled: the multiplier of its fixed length, in the flow
+        of the newest sample. ValueError where that is of another time."""
+        links, _, forces = self._instant()
+        return (links * forces).sum(axis=2)
+
+    @property
+    def bead_velocities(self) -> np.ndarray:
+        """(F, N, 3) [m/s] of the beads now, in the flow of the newest sample. ValueError as of tension."""
+        links, (turns, drift), _ = self._instant()
+        steps = 2 * self.fibers.radius * np.cross(turns, links)
+        along = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
+        return along + (drift - along.mean(axis=1))[:, None]
+
+    def _instant(self):
+        """Links, their rates and that of the centre, and contact forces, as of instant_rates."""
+        if not self.samples or self.sampled_until != self.time:
+            raise ValueError(f"no sample of the flow at time {self.time:g}: observe() comes before")
+        sample = self._ambient.samples[-1]
+        turns, drift, forces = rates_of_blocks(self.fibers, self._state, *sample, self.mobility)
+        links = unpack(self._state, (self.fibers.count, self.fibers.beads, 3))[:, :-1]
+        return links, (turns, drift), forces
 
     @property
     def prediction_gap(self) -> np.ndarray:

@@ -28,10 +28,10 @@ log = logging.getLogger(__name__)
 class Journal:
     """Takes the samples of the flow for a fleet, and writes down what became of it.
 
-    `fibers.h5` holds the positions of every `recordInterval`-th step, and of the first. `daemon.dat` has a row a
-    step: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s], <R^2>/L^2 of each family; with
-    feedback also exchange, the power that the fluid gets, friction, Φ, and bending, dE_b/dt [W].
-    `statistics.h5`, where it is asked for, has what `Gathering` gathers.
+    `fibers.h5` holds the positions, and what the entry `record` names, of every `recordInterval`-th step and of the
+    first. `daemon.dat` has a row a step: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s],
+    <R^2>/L^2 of each family; with feedback also exchange, the power that the fluid gets, friction, Φ, and bending,
+    dE_b/dt [W]. `statistics.h5`, where it is asked for, has what `Gathering` gathers.
     """
 
     def __init__(
@@ -63,6 +63,7 @@ class Journal:
             density=scene.density,
             dictionaries=scene.texts,
             program_version=__version__,
+            tension="tension" in scene.record,
         )
         self.gathering = Gathering(scene, folder, share) if scene.statistics else None
         if self.gathering and state is not None:
@@ -102,7 +103,8 @@ class Journal:
             ]
         self._add_row(step, sent_at, arrived_at, gap, powers)
         if not self._recorded or step % self.scene.record_interval == 0:
-            self.recorder.append(step, fleet.time, fleet.by_family)
+            tension = [s.tension for s in fleet.steppers] if self.recorder.tension else None
+            self.recorder.append(step, fleet.time, fleet.by_family, tension)
             self._recorded = True
         if self.gathering:
             self.gathering.take(step, fleet.time, fleet.by_family)

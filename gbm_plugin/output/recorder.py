@@ -58,16 +58,21 @@ class FamilyRecord:
         """Shape of one record, (F, N, 3)."""
         return self.count, self.beads, 3
 
+    @property
+    def links_shape(self) -> tuple[int, int]:
+        """Shape of one record of a value of each link, (F, N−1)."""
+        return self.count, self.beads - 1
+
 
 class Recorder:
-    """Appends the positions of fiber families to a new HDF5 file.
+    """Appends the positions of fiber families, and where asked for the tension of links, to a new HDF5 file.
 
     Every append is one transaction: whenever the process dies, and when the disk fills, all earlier records
     stay readable. No handle on the file is kept between appends, so others may read it at any time.
 
     box_origin, box_size: (3,) [m]; dynamic_viscosity [Pa s]; density [kg/m³]; dictionaries: text of the
-    case's dictionaries by file name. Raises FileExistsError if the file exists, FileFullError (an OSError) if
-    there is no room for it, ValueError for values that are not allowed.
+    case's dictionaries by file name; tension: whether each record has it. Raises FileExistsError if the file
+    exists, FileFullError (an OSError) if there is no room for it, ValueError for values that are not allowed.
     """
 
     def __init__(
@@ -81,9 +86,11 @@ class Recorder:
         density: float,
         dictionaries: Mapping[str, str],
         program_version: str,
+        tension: bool = False,
     ) -> None:
         self.path = Path(path)
         self.families = tuple(families)
+        self.tension = tension
         names = [family.name for family in self.families]
         if not names or len(set(names)) != len(names):
             raise ValueError(f"{self.path}: families are {names}; at least one and no name twice is allowed")
@@ -140,9 +147,18 @@ class Recorder:
             group.create_dataset("bending_stiffness", data=stiffness).attrs["units"] = "N m^2"
             group.create_dataset("radius", data=float(family.radius)).attrs["units"] = "m"
             _growing(group, "positions", family.shape, np.float64, "m")
+            if self.tension:
+                _growing(group, "tension", family.links_shape, np.float64, "N")
 
-    def append(self, step: int, time: float, positions: Sequence[ArrayLike]) -> None:
-        """Add one record: positions[i] (F, N, 3) [m] of family i, unwrapped, at `time` [s], flow step `step`.
+    def append(
+        self,
+        step: int,
+        time: float,
+        positions: Sequence[ArrayLike],
+        tension: Sequence[ArrayLike] | None = None,
+    ) -> None:
+        """Add one record: positions[i] (F, N, 3) [m] of family i, unwrapped, at `time` [s], flow step `step`;
+        tension[i] (F, N−1) [N] of its links, in a file that has it.
 
         Raises ValueError for another shape or a time or step that does not advance, FloatingPointError for a
         value that is not finite, FileFullError (an OSError) if there is no room; the file then holds all
@@ -151,13 +167,25 @@ class Recorder:
         if self._closed:
             raise ValueError(f"{self.path}: the recorder is closed")
         step, time = int(step), float(time)
-        arrays = self._checked(step, time, positions)
+        self._check_place(step, time)
+        if (tension is not None) != self.tension:
+            raise ValueError(
+                f"{self.path}: tension goes with every record of a file made with it, and with no other"
+            )
+        values = {
+            "positions": self._checked(step, time, "positions", positions, [f.shape for f in self.families])
+        }
+        if tension is not None:
+            values["tension"] = self._checked(
+                step, time, "tension", tension, [f.links_shape for f in self.families]
+            )
         try:
             with Transaction(self.path, writable=True) as changes:
                 with h5py.File(changes, "r+", libver=_FORMAT) as file:
                     rows = file["time"].shape[0]
-                    for family, array in zip(self.families, arrays, strict=True):
-                        _append(file[f"families/{family.name}/positions"], rows, array)
+                    for name, arrays in values.items():
+                        for family, array in zip(self.families, arrays, strict=True):
+                            _append(file[f"families/{family.name}/{name}"], rows, array)
                     _append(file["step"], rows, step)
                     _append(file["time"], rows, time)
                 changes.publish()
@@ -169,28 +197,29 @@ class Recorder:
             ) from None
         self._last = step, time
 
-    def _checked(self, step: int, time: float, positions: Sequence[ArrayLike]) -> list[np.ndarray]:
+    def _check_place(self, step: int, time: float) -> None:
         where = f"step {step}, time {time:g} s"
-        if len(positions) != len(self.families):
-            raise ValueError(
-                f"{where}: {len(positions)} arrays of positions for {len(self.families)} families"
-            )
         if not np.isfinite(time):
             raise FloatingPointError(f"{where}: the time is not finite")
         if self._last is not None and (step <= self._last[0] or time <= self._last[1]):
             raise ValueError(f"{where} does not come after step {self._last[0]}, time {self._last[1]:g} s")
-        arrays = [np.asarray(array, dtype=float) for array in positions]
-        for family, array in zip(self.families, arrays, strict=True):
-            if array.shape != family.shape:
+
+    def _checked(
+        self, step: int, time: float, name: str, values: Sequence[ArrayLike], shapes
+    ) -> list[np.ndarray]:
+        where = f"step {step}, time {time:g} s"
+        if len(values) != len(self.families):
+            raise ValueError(f"{where}: {len(values)} arrays of {name} for {len(self.families)} families")
+        arrays = [np.asarray(array, dtype=float) for array in values]
+        for family, array, shape in zip(self.families, arrays, shapes, strict=True):
+            if array.shape != shape:
                 raise ValueError(
-                    f"{where}: positions of family {family.name!r} have shape {array.shape}, "
-                    f"not {family.shape}"
+                    f"{where}: {name} of family {family.name!r}: shape {array.shape}, not {shape}"
                 )
-            broken = ~np.isfinite(array).all(axis=(1, 2))
+            broken = ~np.isfinite(array.reshape(len(array), -1)).all(axis=1)
             if broken.any():
                 raise FloatingPointError(
-                    f"{where}: a position of fiber {int(broken.argmax())} of family {family.name!r} "
-                    f"is not finite"
+                    f"{where}: {name} of fiber {int(broken.argmax())} of family {family.name!r}: not finite"
                 )
         return arrays
 

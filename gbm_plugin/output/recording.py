@@ -21,11 +21,11 @@ from .transaction import Transaction
 ATTEMPTS, PAUSE = 4, 0.02  # to open a file that a run is adding to [s]
 SMALL, DENSITY = 64 << 20, 100  # a dataset may have so many bytes, or so many times those of its file
 
-__all__ = ["FamilyRecord", "Positions", "RecordedFamily", "Recorder", "Recording", "open_recording"]
+__all__ = ["FamilyRecord", "RecordedFamily", "Recorder", "Recording", "Records", "open_recording"]
 
 
-class Positions:
-    """Positions (S, F, N, 3) [m] of one family, read from the files when indexed: by slices and whole numbers,
+class Records:
+    """Values (S, ...) of one family at all times, read from the files when indexed: by slices and whole numbers,
     times also by an array of them or of truth values."""
 
     def __init__(self, parts: list[tuple[h5py.Dataset, int]]) -> None:
@@ -34,7 +34,7 @@ class Positions:
         self._starts = np.cumsum([0] + [count for _, count in parts])
         self.shape = (int(self._starts[-1]), *parts[0][0].shape[1:])
         self.dtype = np.dtype(np.float64)
-        self.ndim = 4
+        self.ndim = len(self.shape)
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -62,18 +62,20 @@ class Positions:
         return np.asarray(self[:], dtype=dtype)
 
 
-def _finite(positions: NDArray) -> NDArray:
+def _finite(values: NDArray) -> NDArray:
     """The recorder writes no others."""
-    if not np.isfinite(positions).all():
-        raise ValueError("a recording holds positions that are not finite: it was damaged")
-    return positions
+    if not np.isfinite(values).all():
+        raise ValueError("a recording holds values that are not finite: it was damaged")
+    return values
 
 
 @dataclass(frozen=True)
 class RecordedFamily(FamilyRecord):
-    """A recorded family: its FamilyRecord and its positions (S, F, N, 3) [m]."""
+    """A recorded family: its FamilyRecord, its positions (S, F, N, 3) [m], and the tension (S, F, N−1) [N] of its
+    links, None where a part of the run was recorded without."""
 
-    positions: Positions = None
+    positions: Records = None
+    tension: Records | None = None
 
 
 class Recording:
@@ -101,9 +103,8 @@ class Recording:
         self.families = {
             name: RecordedFamily(
                 **vars(record),
-                positions=Positions(
-                    [(part.positions(name), count) for part, count in zip(parts, counts, strict=True)]
-                ),
+                positions=_records(parts, counts, name, "positions"),
+                tension=_records(parts, counts, name, "tension") if all(p.tension for p in parts) else None,
             )
             for name, record in last.families.items()
         }
@@ -117,6 +118,10 @@ class Recording:
 
     def __exit__(self, *_) -> None:
         self.close()
+
+
+def _records(parts: list[_Part], counts: list[int], name: str, kind: str) -> Records:
+    return Records([(part.records(name, kind), count) for part, count in zip(parts, counts, strict=True)])
 
 
 class _Part:
@@ -135,6 +140,7 @@ class _Part:
         complete = min(len(file.times) for file in self.files)  # a kill leaves some with one record more
         self.times, self.steps = first.times[:complete], first.steps[:complete]
         self.families = first.families
+        self.tension = all(file.tension for file in self.files)
         for file in self.files[1:]:
             if not np.array_equal(file.steps[:complete], self.steps) or list(file.families) != list(
                 self.families
@@ -153,8 +159,8 @@ class _Part:
             stiffness = np.concatenate([record.bending_stiffness for record in records])
         return replace(records[0], count=sum(record.count for record in records), bending_stiffness=stiffness)
 
-    def positions(self, name: str) -> h5py.Dataset | _Joined:
-        datasets = [file.file[f"families/{name}/positions"] for file in self.files]
+    def records(self, name: str, kind: str) -> h5py.Dataset | _Joined:
+        datasets = [file.file[f"families/{name}/{kind}"] for file in self.files]
         return datasets[0] if len(datasets) == 1 else _Joined(datasets)
 
     def close(self) -> None:
@@ -163,7 +169,7 @@ class _Part:
 
 
 class _Joined:
-    """Datasets (S, F, N, 3) of several files as one, their fibers one after the other."""
+    """Datasets (S, F, ...) of several files as one, their fibers one after the other."""
 
     def __init__(self, datasets: list[h5py.Dataset]) -> None:
         self._datasets = datasets
@@ -221,6 +227,7 @@ class _File:
             raise ValueError("it has no families")
         groups = sorted(groups.items(), key=lambda item: int(item[1].attrs["number"]))
         self.families = {name: self._family(name, group, most) for name, group in groups}
+        self.tension = all("tension" in group for _, group in groups)
         self.metadata = self._metadata(most)
 
     def _family(self, name: str, group: h5py.Group, most: int) -> FamilyRecord:
@@ -230,6 +237,10 @@ class _File:
             raise ValueError(
                 f"family {name} has positions of shape {positions.shape} at {len(self.times)} times"
             )
+        if "tension" in group:
+            shape = _dataset(group, "tension", 3, most).shape
+            if shape != (len(self.times), count, beads - 1):
+                raise ValueError(f"family {name} has a tension of shape {shape} at {len(self.times)} times")
         seed = group.attrs["seed"]
         stiffness = _numbers(group, "bending_stiffness", None, most)
         model = dict(_child(group, "model", h5py.Group).attrs)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..files import replaced
 from ..output.recording import Recording
-from ..statistics.fibers import curvature
+from ..statistics.fibers import bead_curvature, bead_tension
 from .vtp import Polylines, write_vtp
 
 if TYPE_CHECKING:
@@ -37,8 +37,9 @@ def write_series(
     box: widths [m] of the periodic box, three or one, of trajectories that are wrapped; a recording has its own.
     wrapped: every fiber cut at the faces of the periodic box and each piece shifted into it; otherwise fibers
     are whole, where they were carried. Point data: curvature [1/m] (eq. (5); end beads as their neighbours, 0 for two
-    beads), velocity [m/s] (differences between records), radius [m], stiffness K^b [N m2], family (its number), fiber
-    (unique over the families), bead (index; fractional at a cut). Data of each line: family, fiber.
+    beads), velocity [m/s] (differences between records), radius [m], stiffness K^b [N m2], tension [N] where it was
+    recorded (mean of the links beside a bead), family (its number), fiber (unique over the families), bead (index;
+    fractional at a cut). Data of each line: family, fiber.
     Replaces a series that is there. Raises OSError if it cannot be written.
     """
     if not isinstance(recording, Recording):
@@ -72,6 +73,7 @@ class _Moving(NamedTuple):
     bending_stiffness: NDArray
     count: int
     beads: int
+    tension: None = None
 
 
 class _Trajectories(NamedTuple):
@@ -108,6 +110,7 @@ def _of_trajectories(given: Trajectory | Sequence[Trajectory], box, wrapped: boo
 def polylines(recording: Recording | _Trajectories, row: int, wrapped: bool) -> Polylines:
     """All fibers at the `row`-th time, with the data of `write_series`."""
     parts, first = [], 0
+    tensions = all(family.tension is not None for family in recording.families.values())
     for number, family in enumerate(recording.families.values()):
         positions = family.positions[row]
         fiber, bead = np.indices(positions.shape[:2], dtype=float)
@@ -118,6 +121,7 @@ def polylines(recording: Recording | _Trajectories, row: int, wrapped: bool) -> 
             *(np.broadcast_to(v, bead.shape)[..., None] for v in (family.radius, stiffness, number)),
             (fiber + first)[..., None],
             bead[..., None],
+            *([bead_tension(family.tension[row])[..., None]] if tensions else []),
         ]
         chains = np.concatenate([positions, *along], axis=-1)
         if wrapped:
@@ -132,9 +136,13 @@ def polylines(recording: Recording | _Trajectories, row: int, wrapped: bool) -> 
     offsets = [start + part[:-1] for start, (_, part) in zip(starts, parts, strict=False)]
     nodes = np.concatenate([nodes for nodes, _ in parts])
     ends = np.concatenate([*offsets, starts[-1:]])
-    kappa, u, radius, stiffness, family, fiber, bead = np.split(nodes[:, 3:], [1, 4, 5, 6, 7, 8], axis=1)
+    kappa, u, radius, stiffness, family, fiber, bead, *pull = np.split(
+        nodes[:, 3:], [1, 4, 5, 6, 7, 8, *([9] if tensions else [])], axis=1
+    )
     whole = {"family": family[:, 0].astype(np.int32), "fiber": fiber[:, 0].astype(np.int32)}
     along = {"curvature": kappa[:, 0], "velocity": u, "radius": radius[:, 0], "stiffness": stiffness[:, 0]}
+    if pull:
+        along["tension"] = pull[0][:, 0]
     return Polylines(
         nodes[:, :3],
         ends,
@@ -163,14 +171,6 @@ def _joined(nodes: NDArray, links: NDArray) -> tuple[NDArray, NDArray]:
     lengths = np.diff(np.append(start, len(links))) + 1
     order = np.insert(links[:, 1], start, links[start, 0])
     return nodes[order], np.concatenate([[0], np.cumsum(lengths)])
-
-
-def bead_curvature(positions: ArrayLike, radius: float) -> NDArray[np.float64]:
-    """Curvature of eq. (5) at every bead, (..., N) [1/m]: the end beads take their neighbours'."""
-    inner = curvature(positions, radius)
-    if inner.shape[-1] == 0:
-        return np.zeros(np.shape(positions)[:-1])
-    return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
 
 def cut_at_faces(chains: NDArray, origin: ArrayLike, size: ArrayLike) -> tuple[NDArray, NDArray]:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, interp1d
 
 from ..output.recording import RecordedFamily, Recording
-from .paraview import bead_curvature, cut_at_faces
+from ..statistics.fibers import bead_curvature
+from .paraview import cut_at_faces
 from .style import new_figure
 
 # light (straight) to dark (bent); one hue per family, told apart by colour-blind readers too

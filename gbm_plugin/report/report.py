@@ -15,7 +15,7 @@ from ..case.mesh import box_mesh
 from ..case.trust import check_case
 from ..files import replaced, write_text
 from ..output.field import latest_time, read_velocity, vorticity_magnitude
-from ..output.recording import Recording, open_recording
+from ..output.recording import RecordedFamily, Recording, open_recording
 from ..output.tables import read_forcing
 from ..scales import kolmogorov_length
 from ..statistics import fibers as shape
@@ -173,7 +173,10 @@ def _fibers(recording: Recording, folder: Path, key: dict) -> None:
     columns: dict[str, NDArray] = {"time [s]": recording.times, "step": recording.steps}
     curves, families = {}, {}
     for name, family in recording.families.items():
-        rows = [_shape(family.positions[row], family.radius) for row in range(len(recording.times))]
+        rows = [
+            _shape(family.positions[row], family.radius) | _tension(family, row)
+            for row in range(len(recording.times))
+        ]
         series = {quantity: np.array([row[quantity] for row in rows]) for quantity in rows[0]}
         columns |= {f"{name}: {quantity}": values for quantity, values in series.items()}
         ratio, error = series["<R^2>/(2a(N-1))^2"], series["standard error of it"]
@@ -192,6 +195,9 @@ def _fibers(recording: Recording, folder: Path, key: dict) -> None:
             "gyration_radius": _mean(series["gyration radius [m]"][late]),
             "worst_link_length_error": series["worst link length error"].max(),
         }
+        if "mean tension [N]" in series:
+            families[name]["tension_mean"] = _mean(series["mean tension [N]"][late])
+            families[name]["tension_largest"] = series["largest tension [N]"].max()
     key["files"] += [
         _write_csv(folder / "fibers.csv", columns),
         *save(end_to_end_figure(recording.times, curves, _when(key)), folder, "end_to_end"),
@@ -216,6 +222,18 @@ def _shape(positions: NDArray, radius: float) -> dict[str, float]:
         "mean curvature [1/m]": bent,
         "gyration radius [m]": shape.gyration_radius(positions).mean(),
         "worst link length error": shape.link_length_error(positions, radius),
+    }
+
+
+def _tension(family: RecordedFamily, row: int) -> dict[str, float]:
+    """Of all links at one time; nothing where it was not recorded."""
+    if family.tension is None:
+        return {}
+    values = family.tension[row]
+    return {
+        "mean tension [N]": values.mean(),
+        "largest tension [N]": values.max(),
+        "smallest tension [N]": values.min(),
     }
 
 

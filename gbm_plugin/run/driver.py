@@ -13,9 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..case.box_mesh import MOST, write_box_mesh
 from ..case.disk import Room
 from ..case.initial import write_velocity
 from ..case.layout import STATE_FILE, results
+from ..case.mesh import has_mesh, read_box
 from ..case.prepare import name_for_paraview
 from ..case.scene import Scene
 from ..case.times import Start
@@ -74,10 +76,33 @@ def results_folder(case: Path, name: str) -> Path:
         for part in ("constant", "system"):
             if not (folder / part).exists():
                 os.symlink(Path("..") / part, folder / part)
+        _mesh_for_paraview(case, folder)
         name_for_paraview(folder)
     except OSError as error:
         raise RunError(f"cannot write in {folder}: {error.strerror}") from None
     return folder
+
+
+def _mesh_for_paraview(case: Path, folder: Path) -> None:
+    """Where the case has no mesh, one of its box beside links to the rest of `constant`."""
+    box, constant = read_box(case), folder / "constant"
+    if has_mesh(case) or box is None:
+        return
+    if math.prod(box.cells) > MOST:
+        log.info(
+            "ParaView shows the flow when there is a mesh, made only to %.2g cells: blockMesh -case %s",
+            MOST,
+            case,
+        )
+        return
+    if constant.is_symlink():
+        constant.unlink()
+    constant.mkdir(exist_ok=True)
+    for entry in (case / "constant").iterdir():
+        if not (constant / entry.name).is_symlink():
+            os.symlink(Path("../../constant") / entry.name, constant / entry.name)
+    if not has_mesh(folder) or read_box(folder) != box:
+        write_box_mesh(constant / "polyMesh", box)
 
 
 class Run:

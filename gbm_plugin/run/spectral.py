@@ -130,10 +130,11 @@ def _forcing(forcing: Forcing | None) -> LinearForcing | EswaranPope | None:
 
 
 class _SpectralFlow(Carrier):
-    """The solver, and its table of energies."""
+    """The solver, and its table of energies, where the forcing's writeToFile is not no."""
 
     def __init__(self, scene: Scene, solver: SpectralSolver, cycles: int = 1):
         self.scene, self.solver, self.cycles = scene, solver, cycles
+        self.tabulates = scene.forcing is None or scene.forcing.table
         # energy and power before the last step, and at its end
         self.before: tuple[float, float] | None = None
         self.now: tuple[float, float] | None = None
@@ -145,6 +146,8 @@ class _SpectralFlow(Carrier):
         return self.solver.shifted_velocity(0.5)
 
     def open(self, name: str) -> None:
+        if not self.tabulates:
+            return
         forcing = self.scene.forcing.name if self.scene.forcing else "flow"
         path = results(self.scene.case, forcing) / name / flow_table(forcing)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -160,6 +163,8 @@ class _SpectralFlow(Carrier):
         self.solver.set_point_forces(places, reaction.force / density, reaction.torque / density)
 
     def note(self, time: float) -> None:
+        if not self.tabulates:
+            return
         energy, power, dissipation, exchange = self.solver.energetics().values()
         balance = dissipation
         self.before, self.now = self.now, (energy, power + exchange)
@@ -180,7 +185,8 @@ class _SpectralFlow(Carrier):
         path = folder / FLOW_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
         with replaced(path, "wb") as file:
-            np.savez(file, before=self.before, **self.solver.state())
+            before = self.before or tuple(self.solver.energetics().values())[:2]  # without a table
+            np.savez(file, before=before, **self.solver.state())
 
     def restore(self, folder: Path, time: float) -> None:
         path = folder / FLOW_FILE
@@ -196,4 +202,5 @@ class _SpectralFlow(Carrier):
             raise StateError(f"the state of the flow {path} cannot be continued from: {error}") from None
 
     def close(self) -> None:
-        self.table.close()
+        if self.tabulates:
+            self.table.close()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-from ..case.mesh import has_mesh
 from ..case.scene import Scene
 from ..report.summary import summary
 
@@ -31,8 +30,6 @@ def closing(scene: Scene, folder: Path) -> None:
     for line in summary(folder, cell):
         log.info(line)
     log.info("written: time folders and postProcessing in %s", _short(folder))
-    if not has_mesh(scene.case):
-        log.info("ParaView shows the flow when there is a mesh: blockMesh -case %s", _short(scene.case))
     log.info("next: gbm report %s    figures, tables, fibers for ParaView", _short(folder))
 
 

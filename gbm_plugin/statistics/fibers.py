@@ -95,3 +95,18 @@ def gyration_radius(positions: ArrayLike) -> NDArray[np.float64]:
     positions = _checked(positions, 2)
     offsets = positions - positions.mean(axis=-2, keepdims=True)
     return np.sqrt((offsets**2).sum(axis=-1).mean(axis=-1))
+
+
+def bead_curvature(positions: ArrayLike, radius: float) -> NDArray[np.float64]:
+    """Curvature of eq. (5) at every bead, (..., N) [1/m]: the end beads take their neighbours'."""
+    inner = curvature(positions, radius)
+    if inner.shape[-1] == 0:
+        return np.zeros(np.shape(positions)[:-1])
+    return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
+
+
+def bead_tension(links: ArrayLike) -> NDArray[np.float64]:
+    """Tension (..., N−1) of links at every bead, (..., N): the mean of the links beside it."""
+    links = np.asarray(links, dtype=float)
+    padded = np.concatenate([links[..., :1], links, links[..., -1:]], axis=-1)
+    return 0.5 * (padded[..., 1:] + padded[..., :-1])

@@ -12,11 +12,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gbm_plugin.case.scene import Family, Model
+from gbm_plugin.case.foamfile import read_list
+from gbm_plugin.case.scene import Family, Model, read_scene
 from gbm_plugin.case.share import Share, all_shares, shared_files
+from gbm_plugin.fleet.cloud import complete_clouds
 from gbm_plugin.fleet.fleet import Fleet
 from gbm_plugin.flow import TaylorGreen
 from gbm_plugin.output.recording import open_recording
+from gbm_plugin.report.paraview import polylines
 
 from conftest import divide, gbm, make_case, run_case, set_entry, start_solver
 from fakes import children, kill_all_of, last_step, start_gbm, until
@@ -80,8 +83,17 @@ def test_on_several_ranks(tmp_path, expected, daemons, ranks):
     assert np.abs(recorded(case) - expected).max() < 1e-8
     cloud = case / "0.4/lagrangian/fibers"  # reconstructed from the ranks
     labels = {name: _labels(cloud / name) for name in ("family", "fiber", "bead")}
-    beads = [(0, f, b) for f in range(7) for b in range(6)] + [(1, f, b) for f in range(3) for b in range(4)]
+    beads = [(0, f, b) for f in range(7) for b in range(6)] + [
+        (1, 7 + f, b) for f in range(3) for b in range(4)
+    ]
     assert sorted(zip(*labels.values(), strict=True)) == beads
+    # what the report adds finds its beads, whatever order they have
+    assert complete_clouds(read_scene(case)) == ["0.2", "0.4"]
+    with open_recording(case / "postProcessing/fibers") as recording:
+        lines = polylines(recording, -1, wrapped=False).point_data
+    order = np.lexsort([labels["bead"], labels["fiber"]])
+    for field in ("curvature", "stiffness"):
+        np.testing.assert_allclose(read_list(cloud / field)[order], lines[field], rtol=1e-6, atol=1e-9)
 
 
 def _labels(path: Path) -> list[int]:

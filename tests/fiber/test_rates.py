@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gbm_plugin.fiber import Fibers, instant_rates
+from gbm_plugin.fiber import Fibers, Stepper, instant_rates
 
 from fiber_cases import bent, crooked, dense_solution, positions_of, straight_chain
 
@@ -128,3 +128,59 @@ def test_straight_and_folded_links_feel_no_moment():
         turn, drift, _ = instant_rates(fibers, np.zeros(3), np.zeros(3))
         assert np.abs(turn).max() == 0 and np.abs(drift).max() == 0
         assert (fibers.curvature == 0).all()
+
+
+def at_rest(beads, gradient, drift=(0, 0, 0), **options):
+    """Steppers' view of a rod along x, in a linear flow with a centre velocity, L = 2."""
+    fibers = Fibers(straight_chain(beads, 2 / beads), 1e-3, 0.7)
+    stepper = Stepper(fibers, **options)
+    gradient = np.asarray(gradient, dtype=float)
+    spin = gradient - gradient.T
+    turn = 0.5 * np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
+    velocity = stepper.positions @ gradient.T + drift
+    stepper.observe(0.0, velocity, np.broadcast_to(turn, velocity.shape))
+    return stepper
+
+
+@pytest.mark.parametrize("integrator", ["ab3", "implicit"])
+@pytest.mark.parametrize("beads", [2, 3, 10])
+def test_tension_of_a_rod_along_an_extension(beads, integrator):
+    """In free drain the beads up to link i are pulled from the rest by their drag, T_i = 6πμa E Σ_{j≤i} (x_c − x_j)
+    = 6πμa 2a E i (N − i)/2, i = 1 … N − 1 (a slender body has the same parabola, E (l² − s²)/2 times a drag per
+    length); compressed, where the flow comes in."""
+    for rate in (1.5, -1.5):
+        stepper = at_rest(beads, np.diag([rate, -rate / 2, -rate / 2]), integrator=integrator)
+        radius, link = stepper.fibers.radius, np.arange(1, beads)
+        expected = 6 * np.pi * 0.7 * radius * 2 * radius * rate * link * (beads - link) / 2
+        np.testing.assert_allclose(stepper.tension[0], expected, rtol=1e-12)
+        np.testing.assert_allclose(stepper.bead_velocities, 0, atol=1e-13)
+
+
+@pytest.mark.parametrize("mobility", ["freeDrain", "rpy"])
+def test_no_tension_where_a_flow_moves_it_as_a_rigid_body(mobility):
+    rotation = [[0, -1, 0.3], [1, 0, 0.2], [-0.3, -0.2, 0]]
+    stepper = at_rest(6, rotation, (0.5, 2, 1), mobility=mobility)
+    assert np.abs(stepper.tension).max() < 1e-13
+    np.testing.assert_allclose(
+        stepper.bead_velocities, stepper.positions @ np.transpose(rotation) + (0.5, 2, 1), atol=1e-13
+    )
+
+
+@pytest.mark.parametrize("mobility", ["freeDrain", "rpy"])
+def test_tension_and_velocities_of_bent_fibers_equal_the_dense_solution(mobility):
+    fibers = Fibers(crooked(3, 7, 0.2, 1), 0.3, 0.7)
+    velocity, rotation = np.random.default_rng(2).standard_normal((2, 3, 7, 3))
+    stepper = Stepper(fibers, mobility=mobility)
+    stepper.observe(0.0, velocity, rotation)
+    for f in range(3):
+        v, _, forces = dense_solution(fibers, f, velocity[f], rotation[f], mobility)
+        assert np.abs(stepper.bead_velocities[f] - v).max() < 1e-11 * np.abs(v).max()
+        pull = (forces * fibers.links[f]).sum(axis=1)
+        assert np.abs(stepper.tension[f] - pull).max() < 1e-10 * np.abs(forces).max()
+
+
+def test_tension_needs_the_flow_of_now():
+    stepper = at_rest(4, np.zeros((3, 3)))
+    stepper.advance(0.1)
+    with pytest.raises(ValueError, match="no sample of the flow at time"):
+        _ = stepper.tension

@@ -8,9 +8,10 @@ import meshio
 import numpy as np
 import pytest
 
+from gbm_plugin.case.foamfile import read_list
 from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
-from gbm_plugin.report.paraview import line_mesh
+from gbm_plugin.report.paraview import line_mesh, polylines
 
 from conftest import gbm, make_case, run_case
 
@@ -25,6 +26,8 @@ FAMILIES = """
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     path = make_case(tmp_path_factory.mktemp("run") / "case", steps=10, write_every=5, families=FAMILIES)
+    fibers = path / "constant/fiberProperties"
+    fibers.write_text(fibers.read_text().replace("recordInterval 1;", "recordInterval 1; record (tension);"))
     run_case(path)
     return path
 
@@ -51,7 +54,9 @@ def test_foam_to_vtk_shows_the_cloud_beside_the_flow(finished, recording):
     expected = np.mod(last_positions(recording), 2 * np.pi)
     np.testing.assert_allclose(arrays["Points"].reshape(-1, 3), expected, atol=1e-5)
     np.testing.assert_array_equal(arrays["family"], [0] * 30 + [1] * 12)
-    np.testing.assert_array_equal(arrays["fiber"], [i // 6 for i in range(30)] + [i // 4 for i in range(12)])
+    np.testing.assert_array_equal(
+        arrays["fiber"], [i // 6 for i in range(30)] + [5 + i // 4 for i in range(12)]
+    )
     np.testing.assert_array_equal(arrays["bead"], [i % 6 for i in range(30)] + [i % 4 for i in range(12)])
 
 
@@ -79,6 +84,36 @@ def test_report_and_fiber_series(finished, recording):
     np.testing.assert_allclose(last.points, last_positions(recording), atol=1e-12)
     assert np.abs(last.points - first.points).max() > 0.01
     assert last.cells_dict["line"].shape == (5 * 5 + 3 * 3, 2)
+
+
+def test_the_report_completes_the_cloud(finished, recording):
+    """With what the series of polylines has, at all written times; the state at a time gives the recorded tension."""
+    assert gbm("report", finished).returncode == 0
+    for name, row in (("0.1", 5), ("0.2", 10)):
+        cloud = finished / name / "lagrangian/fibers"
+        lines = polylines(recording, row, wrapped=False).point_data
+        for field in ("curvature", "radius", "stiffness", "tension"):
+            np.testing.assert_allclose(read_list(cloud / field), lines[field], rtol=1e-9, atol=1e-12)
+        for label in ("family", "fiber", "bead"):
+            np.testing.assert_array_equal(read_list(cloud / label), lines[label])
+    velocity = read_list(finished / "0.1/lagrangian/fibers/velocity")
+    central = np.concatenate(
+        [(f.positions[6] - f.positions[4]).reshape(-1, 3) / (2 * 0.02) for f in recording.families.values()]
+    )
+    assert np.abs(velocity - central).max() < 2e-3 * np.abs(central).max()
+    written = (finished / "0.1/lagrangian/fibers/stiffness").stat().st_mtime_ns
+    assert gbm("report", finished).returncode == 0
+    assert (finished / "0.1/lagrangian/fibers/stiffness").stat().st_mtime_ns == written
+
+
+def test_openfoam_reads_the_completed_cloud(finished):
+    assert gbm("report", finished).returncode == 0
+    utility(finished, "foamToVTK", "-latestTime", "-ascii", "-overwrite")
+    cloud = ElementTree.parse(next(finished.glob("VTK/lagrangian/fibers/*.vtp")))
+    arrays = {a.get("Name"): np.array(a.text.split(), float) for a in cloud.iter("DataArray") if a.text}
+    for field in ("curvature", "velocity", "radius", "stiffness", "tension"):
+        there = read_list(finished / "0.2/lagrangian/fibers" / field).ravel()
+        np.testing.assert_allclose(arrays[field], there, rtol=1e-5, atol=1e-12)
 
 
 def test_the_recording_says_where_it_comes_from(finished, recording):

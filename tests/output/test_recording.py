@@ -107,10 +107,10 @@ def test_existing_recording_is_not_overwritten(write):
     ("step", "change", "error", "message"),
     [
         (5, lambda a: a[:1], ValueError, "1 arrays of positions for 2 families"),
-        (5, lambda a: [a[1], a[0]], ValueError, "family 'stiff' have shape"),
+        (5, lambda a: [a[1], a[0]], ValueError, "family 'stiff': shape"),
         (4, lambda a: a, ValueError, "does not come after step 4"),
         (5, lambda a: [a[0], np.where(np.arange(3)[:, None, None] == 2, np.nan, a[1])], FloatingPointError,
-         r"step 5, time 0.5 s: a position of fiber 2 of family 'soft'"),
+         r"step 5, time 0.5 s: positions of fiber 2 of family 'soft'"),
     ],
 )  # fmt: skip
 def test_bad_record_is_refused_and_changes_nothing(tmp_path, step, change, error, message):
@@ -331,3 +331,40 @@ def test_memory_does_not_grow(tmp_path):
             if step == 50:
                 start = resident()
         assert resident() - start < 0.1 * 250 * positions.nbytes
+
+
+def tensions(step):
+    return [np.random.default_rng(step).standard_normal((f.count, f.beads - 1)) for f in FAMILIES]
+
+
+def test_tension_is_kept_where_it_is_asked_for(tmp_path):
+    path = tmp_path / "postProcessing/fibers/0/fibers.h5"
+    with Recorder(path, FAMILIES, **SCENE, tension=True) as recorder:
+        for step in range(4):
+            recorder.append(step, 0.1 * step, records(step), tensions(step))
+        with pytest.raises(ValueError, match="tension goes with every record"):
+            recorder.append(4, 0.4, records(4))
+        with pytest.raises(ValueError, match=r"tension of family 'stiff': shape \(3, 9\), not \(4, 5\)"):
+            recorder.append(4, 0.4, records(4), tensions(4)[::-1])
+    with h5py.File(path) as file:
+        assert file["families/soft/tension"].attrs["units"] == "N"
+    with open_recording(path.parent.parent) as recording:
+        check_records(recording, range(4))
+        for number, family in enumerate(recording.families.values()):
+            assert family.tension.shape == (4, family.count, family.beads - 1)
+            np.testing.assert_array_equal(family.tension[:], [tensions(step)[number] for step in range(4)])
+            np.testing.assert_array_equal(family.tension[-1, 1], tensions(3)[number][1])
+
+
+def test_a_run_has_tension_where_all_its_parts_do(tmp_path, write):
+    path = write(range(3))
+    with open_recording(path) as recording:
+        assert recording.families["stiff"].tension is None
+    second = tmp_path / "postProcessing/fibers/0.3/fibers.h5"
+    with Recorder(second, FAMILIES, **SCENE, tension=True) as recorder:
+        recorder.append(3, 0.3, records(3), tensions(3))
+        with pytest.raises(ValueError, match="tension"):
+            Recorder(tmp_path / "none.h5", FAMILIES, **SCENE).append(0, 0.0, records(0), tensions(0))
+    with open_recording([path, second]) as recording:
+        check_records(recording, range(4))
+        assert recording.families["stiff"].tension is None

@@ -205,3 +205,18 @@ def test_a_series_of_trajectories(tmp_path):
     )
     with pytest.raises(ValueError, match="give box to wrap them"):
         write_series(paths[0], tmp_path, wrapped=True)
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_recorded_tension_is_in_the_series(tmp_path, wrapped):
+    """At a bead the mean of the links beside it; the ends have that of their only one."""
+    values = [np.arange(f.count * (f.beads - 1), dtype=float).reshape(f.count, -1) for f in FAMILIES]
+    path = tmp_path / "fibers.h5"
+    with Recorder(path, FAMILIES, **SCENE, tension=True) as recorder:
+        recorder.append(0, 0.0, records(0), values)
+    with open_recording(path) as recording:
+        write_series(recording, tmp_path, wrapped)
+    data = read_vtp(next(tmp_path.glob("*/fibers_000000.vtp"))).point_data
+    own = (data["family"] == 1) & (data["fiber"] == FAMILIES[0].count + 2)
+    expected = {0: 18.0, 1: 18.5, 5: 22.5, 9: 26.0}  # links 18 … 26 of the third fiber of ten beads
+    assert {b: data["tension"][own & (data["bead"] == b)][0] for b in expected} == expected

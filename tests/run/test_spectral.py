@@ -12,6 +12,9 @@ import time
 import numpy as np
 import pytest
 
+from gbm_plugin.case.foamfile import read_field, read_list
+from gbm_plugin.case.mesh import box_mesh
+from gbm_plugin.case.openfoam import utility
 from gbm_plugin.output.recording import open_recording
 from gbm_plugin.output.tables import read_dat, read_forcing
 from gbm_plugin.report.report import report
@@ -62,6 +65,28 @@ def test_the_results_are_a_case(whole):
     done = gbm("report", whole / "spectral")
     assert done.returncode == 0, done.stderr
     assert (whole / "spectral/report/fibers.png").is_file()
+
+
+def test_paraview_opens_the_results_with_a_mesh(whole):
+    """Of a case that has none: of as many cells as its U has, beside the name for ParaView; no program made it."""
+    folder = whole / "spectral"
+    assert box_mesh(folder)[0] == (24, 24, 24) and (folder / "spectral.foam").is_file()
+    assert len(read_field(folder / "0.4/U")) == 24**3
+    assert not (whole / "constant/polyMesh").exists() and not (whole / "log.blockMesh").exists()
+
+
+@pytest.mark.openfoam
+def test_openfoam_agrees_with_that_mesh(whole):
+    """It is one to checkMesh, and cells and faces are where blockMesh puts them."""
+    folder = whole / "spectral"
+    utility(folder, "checkMesh")
+    assert "Mesh OK" in (folder / "log.checkMesh").read_text()
+    made = make_case(whole.parent / "made", cells=24)
+    for name in ("points", "owner", "neighbour"):
+        ours, theirs = (read_list(case / "constant/polyMesh" / name) for case in (folder, made))
+        assert len(ours) == len(theirs)
+        count = 3 * 24 * 24 * 23 if name != "points" else None
+        np.testing.assert_allclose(ours[:count], theirs[:count], atol=1e-5)
 
 
 def test_a_killed_run_continues_to_the_same_bits(whole, tmp_path):

@@ -15,7 +15,8 @@ Description
     transforms, third order in time. See boxFlow and adamsBashforth3.
 
     Reads and writes U, p and phi as pimpleFoam does, with which runs can be
-    continued either way. All sources of U in constant/fvOptions act. Further
+    continued either way; with 'writePressure no' in controlDict it writes U
+    alone. All sources of U in constant/fvOptions act. Further
     state is in <time>/uniform/boxFoam, for a restart to the same bits.
 \*---------------------------------------------------------------------------*/
 
@@ -94,17 +95,20 @@ int main(int argc, char *argv[])
     };
     const auto complete = [&]()
     {
-        if (everyStep || runTime.writeTime())
+        if (everyStep || (writePressure && runTime.writeTime()))
         {
+            Info<< "Computing p and phi" << endl;
             flow.pressure(p);
             flow.fluxes(phi);
+        }
+        if (everyStep || runTime.writeTime())
+        {
             U.correctBoundaryConditions();
         }
     };
 
     evaluate();
-    flow.pressure(p);
-    flow.fluxes(phi);
+    complete();
     U.correctBoundaryConditions();
 
     Info<< "\nStarting time loop\n" << endl;

@@ -35,6 +35,24 @@ void Foam::writeFiberCloud
     IOField<label> fiber(labels("fiber"));
     IOField<label> bead(labels("bead"));
 
+    // fibers are counted over all families, as in the series of 'gbm report'
+    labelList firstOf;
+    for (const List<fiberFamily>& rank : families)
+    {
+        for (const fiberFamily& part : rank)
+        {
+            if (firstOf.size() < part.family + 2)
+            {
+                firstOf.resize(part.family + 2, 0);
+            }
+            firstOf[part.family + 1] += part.count;
+        }
+    }
+    for (label f = 1; f < firstOf.size(); ++f)
+    {
+        firstOf[f] += firstOf[f - 1];
+    }
+
     forAll(beads.points(), i)
     {
         cloud.addParticle
@@ -50,7 +68,7 @@ void Foam::writeFiberCloud
             ++part;
         }
         family[i] = part->family;
-        fiber[i] = part->first + rest / part->beads;
+        fiber[i] = firstOf[part->family] + part->first + rest/part->beads;
         bead[i] = rest % part->beads;
     }
 

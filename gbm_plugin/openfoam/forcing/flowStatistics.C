@@ -182,6 +182,12 @@ scalar totalDissipation(const volVectorField& U, const vector& mean)
 }
 
 
+int Foam::flowStatistics::debug
+(
+    Foam::debug::debugSwitch("flowStatistics", 0)
+);
+
+
 Foam::vector Foam::flowStatistics::average(const volVectorField& U)
 {
     const scalarField& V = U.mesh().V();
@@ -200,7 +206,12 @@ Foam::vector Foam::flowStatistics::average(const volVectorField& U)
 }
 
 
-Foam::flowStatistics::flowStatistics(const volVectorField& U, const scalar nu)
+Foam::flowStatistics::flowStatistics
+(
+    const volVectorField& U,
+    const scalar nu,
+    const bool dissipation
+)
 :
     mean(average(U))
 {
@@ -217,6 +228,14 @@ Foam::flowStatistics::flowStatistics(const volVectorField& U, const scalar nu)
     reduce(energy, sumOp<scalar>());
 
     k = 0.5*energy/volume;
+    if (!dissipation)
+    {
+        return;
+    }
+    if (debug)
+    {
+        Info<< "flowStatistics: dissipation" << endl;
+    }
     epsilonGradient = nu*totalMagSqrGrad(U)/volume;
     epsilonLaplacian = nu*totalDissipation(U, mean)/volume;
 }

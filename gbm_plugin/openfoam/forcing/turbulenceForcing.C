@@ -52,7 +52,8 @@ void Foam::fv::turbulenceForcing::readCommon
 
     wordList allowed
     ({
-        "type", "active", "U", "phi", "libs", word(type() + "Coeffs")
+        "type", "active", "U", "phi", "libs", "writeToFile",
+        word(type() + "Coeffs")
     });
     allowed.append(entries);
     allowedEntries(dict, allowed);
@@ -60,6 +61,7 @@ void Foam::fv::turbulenceForcing::readCommon
 
     UName_ = coeffs_.lookupOrDefault<word>("U", "U");
     phiName_ = coeffs_.lookupOrDefault<word>("phi", "phi");
+    writeToFile_ = coeffs_.lookupOrDefault<bool>("writeToFile", true);
 }
 
 
@@ -70,7 +72,7 @@ void Foam::fv::turbulenceForcing::start()
     consistentStart(mesh_, UName_, phiName_);
     restoreState();
 
-    if (Pstream::master())
+    if (writeToFile() && Pstream::master())
     {
         const word& name = option::name();
 
@@ -176,6 +178,10 @@ void Foam::fv::turbulenceForcing::writeRow
     const scalar power
 )
 {
+    if (!writeToFile())
+    {
+        return;
+    }
     const scalar uPrime = Foam::sqrt(2*s.k/3);
     const scalar epsilon = max(s.epsilonLaplacian, VSMALL);     // at rest
 
@@ -234,10 +240,10 @@ void Foam::fv::turbulenceForcing::keep
 void Foam::fv::turbulenceForcing::beginStep(const volVectorField& U)
 {
     nu_ = kinematicViscosity(mesh_);
-    const flowStatistics now(U, nu_);
+    const flowStatistics now(U, nu_, writeToFile());
     const scalar start = mesh_.time().value() - mesh_.time().deltaTValue();
     checkFinite(now, start);
-    const scalar powerNow = power(U, now);
+    const scalar powerNow = writeToFile() ? power(U, now) : 0;
 
     writeRow(start, now, powerNow);
     choose(now);
@@ -298,7 +304,7 @@ void Foam::fv::turbulenceForcing::endRate()
 {
     if (first_)
     {
-        const scalar powerNow = power(now_);
+        const scalar powerNow = writeToFile() ? power(now_) : 0;
         writeRow(mesh_.time().value(), now_, powerNow);
         keep(now_, powerNow);
     }
@@ -315,7 +321,7 @@ void Foam::fv::turbulenceForcing::correct(volVectorField& U)
     // No step follows the last one, in which its row would be written. The
     // last call in a step cannot be told, so each replaces the one before.
     const Time& time = mesh_.time();
-    if (!explicit_ && time.value() > time.endTime().value() - 0.5*time.deltaTValue())
+    if (writeToFile() && !explicit_ && time.value() > time.endTime().value() - 0.5*time.deltaTValue())
     {
         rowTime_ = time.value();
         row_.reset(new flowStatistics(U, nu_));
