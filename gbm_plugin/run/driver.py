@@ -89,11 +89,7 @@ def _mesh_for_paraview(case: Path, folder: Path) -> None:
     if has_mesh(case) or box is None:
         return
     if math.prod(box.cells) > MOST:
-        log.info(
-            "ParaView shows the flow when there is a mesh, made only to %.2g cells: blockMesh -case %s",
-            MOST,
-            case,
-        )
+        log.info("for ParaView to show so many cells, make their mesh: blockMesh -case %s", case)
         return
     if constant.is_symlink():
         constant.unlink()

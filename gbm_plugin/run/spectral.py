@@ -185,8 +185,13 @@ class _SpectralFlow(Carrier):
         path = folder / FLOW_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
         with replaced(path, "wb") as file:
-            before = self.before or tuple(self.solver.energetics().values())[:2]  # without a table
+            before = self.before or self._energy_and_power()
             np.savez(file, before=before, **self.solver.state())
+
+    def _energy_and_power(self) -> tuple[float, float]:
+        """Of the present state, where no table has told them."""
+        energy, power, _, exchange = self.solver.energetics().values()
+        return energy, power + exchange
 
     def restore(self, folder: Path, time: float) -> None:
         path = folder / FLOW_FILE
