@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq, least_squares, minimize_scalar
 
 RANGE = (0.02, 200.0)  # of γ
 
@@ -72,6 +72,47 @@ def fit(length: ArrayLike, ratio: ArrayLike, error: ArrayLike, prefactor: bool =
         spread = np.sqrt((len(x) - 1) / len(x) * ((np.array(parts) - np.mean(parts)) ** 2).sum())
         error = max(error, float(spread))
     return Fit(whole, error if error > 0 else None, scatter, len(x))
+
+
+@dataclass(frozen=True)
+class Transition:
+    """<R²>/L² = P + (1 − P)/(1 + (x/x₀)^n) of x = L/l_p: straight fibers that begin to buckle, and a plateau. Errors:
+    those of leaving out one point after the other; scatter: the rms of ln <R²>/L² from the curve."""
+
+    plateau: float
+    middle: float
+    steepness: float
+    errors: tuple[float, float, float]
+    scatter: float
+
+    def __call__(self, length: ArrayLike) -> NDArray:
+        return _transition((self.plateau, self.middle, self.steepness), np.asarray(length, float))
+
+
+def _transition(words, x: NDArray) -> NDArray:
+    plateau, middle, steepness = words
+    return plateau + (1 - plateau) / (1 + (x / middle) ** steepness)
+
+
+def fit_transition(length: ArrayLike, ratio: ArrayLike) -> Transition:
+    """The curve through <R²>/L² (M,) at L/l_p (M,), every point alike. ValueError for fewer than five points."""
+    x, y = (np.atleast_1d(np.asarray(v, float)) for v in (length, ratio))
+    if len(x) < 5 or not (x > 0).all() or not (y > 0).all():
+        raise ValueError(
+            "a transition cannot be fitted: positive lengths and ratios of five families are needed"
+        )
+
+    def solve(chosen: NDArray) -> NDArray:
+        bounds = [(1e-3, 0.1, 0.5), (1.0, 100.0, 12.0)]
+        off = lambda words: np.log(y[chosen] / _transition(words, x[chosen]))  # noqa: E731
+        return least_squares(off, (0.4, 5.0, 3.0), bounds=bounds).x
+
+    every = np.arange(len(x))
+    whole = solve(every >= 0)
+    parts = np.array([solve(every != i) for i in every])
+    errors = np.sqrt((len(x) - 1) / len(x) * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    scatter = float(np.sqrt(np.mean(np.log(y / _transition(whole, x)) ** 2)))
+    return Transition(*whole.tolist(), tuple(errors.tolist()), scatter)
 
 
 def _solve(model: Callable, target: NDArray, own: NDArray, chosen) -> tuple[float, float, float]:

@@ -20,13 +20,23 @@ from numpy.typing import NDArray
 from ...report.style import COLOURS, new_figure
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import end_to_end_squared_ratio
-from ...statistics.wormlike import RANGE, fit, persistence_lengths, squared_ratio
+from ...statistics.wormlike import (
+    RANGE,
+    Transition,
+    fit,
+    fit_transition,
+    persistence_lengths,
+    squared_ratio,
+)
 from ..recorded import Family, add_run_arguments, finished_runs, flow_lines
 from ..study import steps
 
 PAPER, EXPERIMENT = 3.0, 2.0
 MARKERS = "osD^vP*X"
 BENT = 5.0  # L/l_p from which a family is bent for sure
+# L/l_p at which a free-draining fiber begins to buckle under compression at the rms longitudinal rate (ε/15ν)^(1/2):
+# 3πμSL⁴/K^b = 123.5 (docs/results/buckling.md), l_p⁴ = K^b (ν/ε)^(1/2)/μ
+BUCKLING = (123.5 * 15**0.5 / (3 * np.pi)) ** 0.25
 LEAST = 1.0  # L/l_p of a family that can tell γ: below, it is a rod
 
 
@@ -70,7 +80,31 @@ def run(
             points.append(point)
             measured.append(_row(point) | {"L_over_eta": family.contour / finished.flow.kolmogorov_length})
     fits = list(_fits([p for p in points if p.family.stiffness > 0]))
-    return {"runs": flows, "rows": measured, "fits": fits, "trend": _trend(measured)}
+    return {
+        "runs": flows,
+        "rows": measured,
+        "fits": fits,
+        "transition": _transition(measured),
+        "trend": _trend(measured),
+    }
+
+
+def _transition(measured: list[dict]) -> dict | None:
+    """What the families do instead: the curve that their buckling makes."""
+    own = [r for r in measured if r["fitted"]]
+    try:
+        found = fit_transition([r["L_over_l_p"] for r in own], [r["R2_over_contour2"] for r in own])
+    except ValueError:
+        return None
+    return {
+        "plateau": found.plateau,
+        "middle": found.middle,
+        "steepness": found.steepness,
+        "errors": list(found.errors),
+        "scatter": found.scatter,
+        "buckling_in_rms_strain": BUCKLING,
+        "families": len(own),
+    }
 
 
 def _trend(measured: list[dict]) -> dict | None:
@@ -197,7 +231,9 @@ def _misfit(points: list[Point], gamma: float) -> float:
 def rows(result: dict) -> list[dict]:
     """The lines of a CSV file: the families, then the fits."""
     trend = [{"run": "trend"} | result["trend"]] if result["trend"] else []
-    return [*result["rows"], *({"run": "fit"} | line for line in result["fits"]), *trend]
+    own = result["transition"]
+    transition = [{"run": "transition"} | {k: v for k, v in own.items() if k != "errors"}] if own else []
+    return [*result["rows"], *({"run": "fit"} | line for line in result["fits"]), *transition, *trend]
 
 
 def table(result: dict) -> str:
@@ -219,6 +255,13 @@ def table(result: dict) -> str:
         error = "" if line["error"] is None else f"{line['error']:7.2g}"
         lines.append(
             f"{line['variant']:34} {line['gamma']:7.3f} {error:>7} {line['scatter']:10.3f} {line['points']:9d}"
+        )
+    if t := result["transition"]:
+        e = t["errors"]
+        lines.append(
+            f"⟨R²⟩/L² = P + (1 − P)/(1 + (L/x₀l_p)^n): P = {t['plateau']:.3f} ± {e[0]:.3f}, x₀ = {t['middle']:.2f} ± "
+            f"{e[1]:.2f}, n = {t['steepness']:.1f} ± {e[2]:.1f}, rms of ln {t['scatter']:.3f}; a fiber in the rms "
+            f"strain rate buckles from L/l_p = {t['buckling_in_rms_strain']:.2f} on"
         )
     if t := result["trend"]:
         lines.append(
@@ -255,6 +298,10 @@ def draw(result: dict) -> Figure:
     for gamma, line, label in curves:
         left.plot(x, squared_ratio(x / gamma), line, color="k", linewidth=1, label=label)
         right.axhline(gamma, linestyle=line, color="k", linewidth=1)
+    if t := result["transition"]:
+        own = Transition(t["plateau"], t["middle"], t["steepness"], tuple(t["errors"]), t["scatter"])
+        left.plot(x, own(x), color=COLOURS[1], linewidth=1.4, label="straight, then a plateau")
+        left.axvline(t["buckling_in_rms_strain"], color="0.6", linewidth=1, linestyle="-.")
     for name, colour in colours.items():
         left.plot([], [], "o", color=colour, markersize=5, label=f"K$^b$ = {name:g}")
     for place, name in enumerate(runs if len(runs) > 1 else []):
