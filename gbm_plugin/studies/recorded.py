@@ -26,6 +26,9 @@ from .study import option
 
 ENGINES = ("spectral", "stored")  # folders in a case that are runs
 BLOCK = 16 << 20  # bytes of positions read at once
+Since = (
+    float | Sequence[float] | None
+)  # start of the averages [s] of all runs or of each; None: their middles
 STIFFER = {"asPrinted": 2.0}  # bending torque: how much stiffer than its K^b it makes a fiber
 
 
@@ -33,8 +36,8 @@ def add_run_arguments(parser: argparse.ArgumentParser, run: Callable) -> None:
     """Which runs, and what of them."""
     text = "folders with postProcessing: a case, or CASE/spectral, CASE/stored (default: the working folder)"
     parser.add_argument("cases", nargs="*", type=Path, default=[Path(".")], metavar="CASE", help=text)
-    text = "start of the averages [s] (default: the middle of each run)"
-    parser.add_argument("--from", dest="since", type=float, metavar="T", help=text)
+    text = "start of the averages [s]; once, or again for each further run (default: the middle of each run)"
+    parser.add_argument("--from", dest="since", type=float, action="append", metavar="T", help=text)
     option(parser, run, "records", "of each run at most, equally spaced")
     text = "families whose names match one of these patterns, as 'K1e-5*' (default: all)"
     parser.add_argument("--families", nargs="+", default=(), metavar="PATTERN", help=text)
@@ -274,12 +277,19 @@ def _table(case: Path) -> dict[str, NDArray]:
 
 
 def finished_runs(
-    cases: Sequence[Path], since: float | None, records: int, families: Sequence[str]
+    cases: Sequence[Path], since: Since, records: int, families: Sequence[str]
 ) -> Iterator[FinishedRun]:
-    """One after the other, open while in use. Labels are unique: a second run of one label has a number."""
+    """One after the other, open while in use; since: one time for all, one for each, or None. Labels are unique: a
+    second run of one label has a number. ValueError for another number of times."""
+    starts = [None] if since is None else np.atleast_1d(since).tolist()
+    starts = starts * len(cases) if len(starts) == 1 else starts
+    if len(starts) != len(cases):
+        raise ValueError(
+            f"--from is given {len(starts)} times for {len(cases)} runs: give it once, or for each"
+        )
     seen: dict[str, int] = {}
-    for case in cases:
-        with FinishedRun(case, since, records, families) as run:
+    for case, start in zip(cases, starts, strict=True):
+        with FinishedRun(case, start, records, families) as run:
             seen[run.label] = seen.get(run.label, 0) + 1
             if seen[run.label] > 1:
                 label = f"{run.label} ({seen[run.label]})"

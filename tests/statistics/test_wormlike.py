@@ -38,7 +38,8 @@ def test_fit_and_its_error():
     draws = [fit(x, y, 0.05 * y) for y in noisy]
     gammas = np.array([d.gamma for d in draws])
     assert gammas.mean() == pytest.approx(2.5, abs=3 * gammas.std() / np.sqrt(40))
-    assert np.median([d.error for d in draws]) == pytest.approx(gammas.std(), rel=0.35)
+    # the larger of two estimates, each of which scatters: on the safe side by a part of their scatter
+    assert 0.8 < np.median([d.error for d in draws]) / gammas.std() < 1.6
     y, e = squared_ratio(x / 2.5), np.full(12, 0.02)
     y[0], e[0] = squared_ratio(x[0] / 5.0), 1e-9
     assert fit(x, y, e).gamma == pytest.approx(2.5, rel=0.05)

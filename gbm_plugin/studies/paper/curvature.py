@@ -24,7 +24,7 @@ from ...report.style import COLOURS, LINES, new_figure
 from ...statistics.densities import density, mean_pairwise, own_noise, quantiles, wasserstein
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import mean_curvature
-from ..recorded import Family, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import compact, steps
 
 BENT = 3.0  # L/l_p from which fibers buckle
@@ -61,7 +61,10 @@ class Sample:
 
 
 def run(
-    cases: Sequence[Path], since: float | None = None, records: int = 400, families: Sequence[str] = ()
+    cases: Sequence[Path],
+    since: Since = None,
+    records: int = 400,
+    families: Sequence[str] = (),
 ) -> dict:
     """Mean curvatures with errors, densities, and the distances between them."""
     samples, flows = [], []

@@ -23,7 +23,7 @@ from ...statistics.ensemble import correlation, fiber_average, integral_scale
 from ...statistics.fibers import end_to_end, mean_curvature
 from ...statistics.orientation import AXES, alignments, directions, tumbling, vorticity
 from ..fields import fields_of
-from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import compact, option, steps
 
 STRAIGHT = 0.8  # R/L, the paper's limit of buckling
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(
     cases: Sequence[Path],
-    since: float | None = None,
+    since: Since = None,
     records: int = 600,
     families: Sequence[str] = (),
     states: int = 12,

@@ -21,7 +21,7 @@ from ...report.style import COLOURS, new_figure
 from ...statistics.densities import density, distance_to
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import end_to_end, gyration_radius
-from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import compact, steps
 
 BINS = 40
@@ -33,7 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(
-    cases: Sequence[Path], since: float | None = None, records: int = 400, families: Sequence[str] = ()
+    cases: Sequence[Path],
+    since: Since = None,
+    records: int = 400,
+    families: Sequence[str] = (),
 ) -> dict:
     """Means, goodness of both theories for each family, densities of all, slopes."""
     measured, densities, flows = [], [], []

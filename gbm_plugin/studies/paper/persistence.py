@@ -28,7 +28,7 @@ from ...statistics.wormlike import (
     persistence_lengths,
     squared_ratio,
 )
-from ..recorded import Family, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import steps
 
 PAPER, EXPERIMENT = 3.0, 2.0
@@ -65,7 +65,10 @@ class Point:
 
 
 def run(
-    cases: Sequence[Path], since: float | None = None, records: int = 400, families: Sequence[str] = ()
+    cases: Sequence[Path],
+    since: Since = None,
+    records: int = 400,
+    families: Sequence[str] = (),
 ) -> dict:
     """<R²>/L² of all families of all runs, and γ with all its variants."""
     points, flows, measured = [], [], []

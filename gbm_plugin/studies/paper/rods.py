@@ -31,7 +31,7 @@ from ...statistics.orientation import (
     tumbling,
 )
 from ..fields import fields_of
-from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import compact, option, steps
 
 SETTLED, SPHERES = 0.09, 1 / 6
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(
     cases: Sequence[Path],
-    since: float | None = None,
+    since: Since = None,
     records: int = 0,
     families: Sequence[str] = (),
     states: int = 6,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...report.style import new_figure
 from ...statistics.fibers import end_to_end
 from ...statistics.orientation import anisotropy
-from ..recorded import Family, FinishedRun, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import steps
 
 CELLS = 60  # of a picture, in each direction
@@ -30,7 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(
-    cases: Sequence[Path], since: float | None = None, records: int = 100, families: Sequence[str] = ()
+    cases: Sequence[Path],
+    since: Since = None,
+    records: int = 100,
+    families: Sequence[str] = (),
 ) -> dict:
     """Isotropy of all families, and the pictures of two."""
     measured, flows, pictures = [], [], []

@@ -7,14 +7,15 @@ NAME.csv, NAME.json and NAME.png, as `gbm study NAME CASE --save` does.
 from __future__ import annotations
 
 import argparse
+import inspect
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from ..recorded import add_run_arguments
+from ..recorded import Since, add_run_arguments
 from ..study import find_studies, option, write
 
-NAMES = ("persistence", "curvature", "end-to-end", "shapes", "rods", "dynamics")
+NAMES = ("persistence", "curvature", "end-to-end", "shapes", "rods", "dynamics", "gathered")
 OTHERS = ("claims", "flows", "flow-one", "flow-one-openfoam", "flow-two")  # that do not take a run
 
 
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(
     cases: Sequence[Path] = (),
-    since: float | None = None,
+    since: Since = None,
     records: int = 400,
     families: Sequence[str] = (),
     into: Path | None = None,
@@ -52,14 +53,17 @@ def make(
     name: str,
     folder: Path,
     cases: Sequence[Path],
-    since: float | None,
+    since: Since,
     records: int,
     families: Sequence[str],
 ) -> dict:
     """Written files and the table, or the reason why it does not apply."""
-    words = {} if name == "rods" else {"records": records}  # rods take all records
+    words = {"since": since, "families": families} | ({} if name == "rods" else {"records": records})
+    known = inspect.signature(
+        study.run
+    ).parameters  # rods take all records, what was gathered has its own start
     try:
-        result = study.run(cases, since=since, families=families, **words)
+        result = study.run(cases, **{n: value for n, value in words.items() if n in known})
         paths = write(study, result, folder / name)
     except (ValueError, FileNotFoundError) as error:
         return {"files": "", "not_made": str(error), "text": ""}

@@ -74,10 +74,22 @@ def test_printed_torque_is_twice_as_stiff(tmp_path):
 def test_several_runs_from_the_command_line(case, tmp_path, monkeypatch, capsys):
     """A figure, a CSV and a JSON file of one name; runs of one label are told apart."""
     monkeypatch.chdir(tmp_path)
-    argv = ["study", "persistence", str(case), str(case), "--from", "5", "--families", "K1e-0[56]*"]
+    argv = [
+        "study",
+        "persistence",
+        str(case),
+        str(case),
+        "--from",
+        "5",
+        "--from",
+        "0",
+        "--families",
+        "K1e-0[56]*",
+    ]
     assert main([*argv, "--save", "found"]) == 0
     assert (tmp_path / "found.png").read_bytes().startswith(b"\x89PNG")
     result = json.loads((tmp_path / "found.json").read_text(), parse_constant=pytest.fail)
+    assert [r["from"] for r in result["runs"]] == [5, 0]
     assert {r["run"] for r in result["rows"]} == {"wlc", "wlc (2)"} and len(result["rows"]) == 6
     with (tmp_path / "found.csv").open() as file:
         lines = list(csv.DictReader(file))
@@ -90,6 +102,7 @@ def test_several_runs_from_the_command_line(case, tmp_path, monkeypatch, capsys)
     [
         (["--from", "100"], "fewer than two records from t = 100 on"),
         (["--families", "none*"], "no family is named none*"),
+        (["--from", "1", "--from", "2"], "--from is given 2 times for 1 runs"),
         (["nowhere"], "there is no folder nowhere"),
         (["."], "no fiber recording"),
     ],
