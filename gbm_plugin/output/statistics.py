@@ -13,7 +13,7 @@ import numpy as np
 from ..case.layout import numbered
 from ..case.share import WHOLE, Share, shared_files
 from ..files import replacement
-from ..statistics.running import EDGES, Running, merged
+from ..statistics.running import Running, merged
 
 STEM, SUFFIX = "statistics", ".h5"
 SCHEMA_VERSION = 1
@@ -41,8 +41,6 @@ def write_statistics(path: Path, times: Sequence[float], families: Mapping[str, 
     with replacement(path) as part, h5py.File(part, "w") as file:
         file.attrs["schema_version"] = SCHEMA_VERSION
         file.create_dataset("time", data=np.array(times, float)).attrs["units"] = "s"
-        for name, edges in EDGES.items():
-            file[f"edges/{name}"] = edges
         for number, (name, running) in enumerate(families.items()):
             group = file.create_group(f"families/{name}")
             group.attrs.update(number=number, fibers=running.fibers, beads=running.beads, lags=running.lags)

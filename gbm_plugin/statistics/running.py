@@ -21,12 +21,12 @@ BINS = 200
 POWERS = 4
 MOST = 1 << 40  # samples
 
-# of which the histogram is; what lies outside counts in the bin at the end
+# of the histograms' bins; what lies outside counts in the one at the end
 EDGES = {
     "R2": np.linspace(0, 1, BINS + 1),
     "projected": np.linspace(0, 1, BINS + 1),
     "Rg": np.linspace(0, 0.5, BINS + 1),
-    "curvature": np.concatenate([[0.0], np.logspace(-5, 1, BINS)]),
+    "curvature": np.concatenate([[0.0], np.logspace(-5, 2, BINS)]),
 }
 
 
@@ -131,7 +131,7 @@ class Running:
         own = {"projected/counts": self.projected}
         for name, a in self.averages.items():
             own |= {f"{name}/sums": np.array(a.sums), f"{name}/of_fibers": a.of_fibers}
-            own |= {f"{name}/powers": a.powers, f"{name}/counts": a.counts}
+            own |= {f"{name}/powers": a.powers, f"{name}/counts": a.counts, f"{name}/edges": a.edges}
         for name, c in self.correlations.items():
             own |= {f"{name}/products": c.products, f"{name}/pairs": c.pairs, f"{name}/recent": c.recent}
         return {name: np.array(value) for name, value in own.items()}
@@ -142,6 +142,7 @@ class Running:
         for name, a in self.averages.items():
             found |= {f"{name}/sums": ("f", (range(MOST),)), f"{name}/of_fibers": ("f", (self.fibers,))}
             found |= {f"{name}/powers": ("f", (POWERS,)), f"{name}/counts": ("i", a.counts.shape)}
+            found |= {f"{name}/edges": ("f", a.edges.shape)}
         for name, c in self.correlations.items():
             lags = self.lags + 1
             found |= {f"{name}/products": ("f", (lags,)), f"{name}/pairs": ("i", (lags,))}
@@ -155,6 +156,8 @@ class Running:
         lengths = {len(state[f"{name}/sums"]) for name in self.averages}
         if len(lengths) != 1:
             raise ValueError(f"it has {' and '.join(map(str, sorted(lengths)))} samples")
+        if any(not np.array_equal(state[f"{name}/edges"], a.edges) for name, a in self.averages.items()):
+            raise ValueError("its histograms have other bins")
         for name, a in self.averages.items():
             a.sums = state[f"{name}/sums"].tolist()
             a.of_fibers, a.powers, a.counts = (
@@ -176,7 +179,7 @@ def merged(states: Sequence[Mapping[str, NDArray]], fibers: slice, pooled: bool 
         if kind in ("of_fibers", "recent"):
             axis = 0 if kind == "of_fibers" else 1
             found[name] = np.concatenate(parts, axis=axis)[(slice(None),) * axis + (fibers,)]
-        elif kind == "pairs":  # of times
+        elif kind in ("pairs", "edges"):  # the same in all parts
             found[name] = first
         elif not pooled:
             found[name] = np.zeros_like(first)

@@ -108,5 +108,7 @@ def test_a_state_of_other_fibers_is_refused(positions):
     for changed in (state | {"R2/of_fibers": np.zeros(3)}, state | {"R/recent": np.full((1, 7, 3), np.nan)}):
         with pytest.raises(ValueError):
             Running(FIBERS, BEADS, RADIUS, LAGS).restore(changed)
+    with pytest.raises(ValueError, match="other bins"):
+        Running(FIBERS, BEADS, RADIUS, LAGS).restore(state | {"R2/edges": 2 * state["R2/edges"]})
     with pytest.raises(ValueError, match="3 and 4 samples"):
         Running(FIBERS, BEADS, RADIUS, LAGS).restore(state | {"Rg/sums": np.zeros(4)})
