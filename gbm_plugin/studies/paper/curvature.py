@@ -244,15 +244,15 @@ def draw(result: dict) -> Figure:
         line = LINES[runs.index(d["run"]) % len(LINES)]
         panels[2].plot(
             d["centres"],
-            d["density"],
+            np.where(np.array(d["density"]) > 0, d["density"], np.nan),
             color=COLOURS[place % len(COLOURS)],
             linestyle=line,
             linewidth=1.2,
             label=label,
         )
-    panels[2].set(xlabel="κ̄ l$_p$", yscale="log", ylim=(1e-3, None), title="families with L/l$_p$ ≥ 3")
+    panels[2].set(xlabel="κ̄ l$_p$", yscale="log", ylim=(2e-2, 100), title="families with L/l$_p$ ≥ 3")
     if stiffnesses:
-        panels[2].legend(fontsize=8)
+        panels[2].legend(fontsize=8, ncols=2, loc="upper right")
     return figure
 
 

@@ -27,6 +27,7 @@ from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_r
 from ..study import compact, option, steps
 
 STRAIGHT = 0.8  # R/L, the paper's limit of buckling
+SHOWN = 200.0  # L/l_p, beyond which a family is not drawn
 LAGS = 60  # kept of a correlation
 MARKERS = "osD^vP*X"
 
@@ -223,7 +224,7 @@ def draw(result: dict) -> Figure:
     panels[0, 0].axhline(0, color="k", linewidth=0.7)
     if curves:
         panels[0, 0].legend(fontsize=8)
-    bent = [r for r in result["rows"] if r["L_over_l_p"] is not None]
+    bent = [r for r in result["rows"] if r["L_over_l_p"] is not None and r["L_over_l_p"] < SHOWN]
     _scatter(panels[0, 1], bent, "L_over_l_p", "time_of_R_over_tau", "L/l$_p$", "integral time of R/τ$_η$")
     _scatter(panels[0, 2], bent, "L_over_l_p", "buckling_rate_times_tau", "L/l$_p$", "buckling rate × τ$_η$")
     _scatter(panels[1, 0], bent, "L_over_l_p", "self_contact", "L/l$_p$", "share of time in self-contact")

@@ -171,11 +171,12 @@ def table(result: dict) -> str:
 
 
 def draw(result: dict) -> Figure:
-    """Figure 7, of the family that is nearest to rods and the one that is nearest to coils, and figure 8."""
+    """Figure 7, of the family that is nearest to rods and the most flexible one, and figure 8."""
     figure = new_figure(12.5, 7.0)
     upper, lower = figure.subplots(2, 3)
     pairs = list(zip(result["rows"], result["densities"], strict=True))
-    families = (min(pairs, key=lambda p: p[0]["D_rigid"]), min(pairs, key=lambda p: p[0]["D_coil"]))
+    soft = max(pairs, key=lambda p: -1 if p[0]["L_over_l_p"] is None else p[0]["L_over_l_p"])
+    families = (min(pairs, key=lambda p: p[0]["D_rigid"]), soft)
     for axes, (row, own), kind in zip((upper, lower), families, ("rods", "coils"), strict=True):
         edges = np.array(own["edges"])
         axes[0].stairs(own["projected"], edges, color=COLOURS[0], label=f"{own['family']}, {own['run']}")

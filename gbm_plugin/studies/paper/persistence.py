@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -282,7 +283,8 @@ def draw(result: dict) -> Figure:
     shown = [r for r in result["rows"] if r["L_over_l_p"] is not None and r["L_over_l_p"] >= LEAST]
     runs = list(dict.fromkeys(r["run"] for r in shown))
     stiffnesses = sorted({r["bending_stiffness"] for r in shown if r["fitted"]})
-    colours = {k: COLOURS[i % len(COLOURS)] for i, k in enumerate(stiffnesses)}
+    shades = colormaps["viridis"](np.linspace(0, 0.92, max(len(stiffnesses), 2)))
+    colours = dict(zip(stiffnesses, shades, strict=False))  # dark is soft
     for r in shown:
         style = {"color": colours.get(r["bending_stiffness"], "0.6"), "elinewidth": 1, "markersize": 5}
         style |= {
@@ -310,7 +312,7 @@ def draw(result: dict) -> Figure:
     for place, name in enumerate(runs if len(runs) > 1 else []):
         left.plot([], [], MARKERS[place % len(MARKERS)], color="0.3", markersize=5, label=name)
     left.set(
-        xscale="log", yscale="log", xlabel="L/l$_p$", ylabel="⟨R²⟩/L²", ylim=(1e-2, 1.3), xlim=(x[0], x[-1])
+        xscale="log", yscale="log", xlabel="L/l$_p$", ylabel="⟨R²⟩/L²", ylim=(0.05, 1.3), xlim=(x[0], x[-1])
     )
     left.legend(fontsize=8)
     right.set(xscale="log", xlabel="L/l$_p$", ylabel="γ of each family", ylim=(0, 10), xlim=(x[0], x[-1]))

@@ -38,6 +38,7 @@ SETTLED, SPHERES = 0.09, 1 / 6
 STRAIGHT = 0.99  # <R²>/L² of a rod
 SHORT, LONG = 10.0, 15.0  # L/η
 RANDOM_RODS = 100_000
+SHOWN = 5  # families whose course in time is drawn
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -208,7 +209,9 @@ def draw(result: dict) -> Figure:
     """Tumbling since the start, settled values against L/η, alignments."""
     figure = new_figure(12.5, 3.9)
     left, middle, right = figure.subplots(1, 3)
-    for number, curve in enumerate(result["curves"]):
+    curves = sorted(result["curves"], key=lambda c: c["L_over_eta"])
+    curves = [curves[i] for i in np.unique(np.linspace(0, len(curves) - 1, SHOWN).round().astype(int))]
+    for number, curve in enumerate(curves):
         style = {"color": COLOURS[number % len(COLOURS)], "linewidth": 1}
         left.plot(
             curve["time_over_tau"], curve["tumbling"], label=f"L/η = {curve['L_over_eta']:.3g}", **style
@@ -238,7 +241,7 @@ def draw(result: dict) -> Figure:
     for number, axis in enumerate(AXES):
         own = sorted((r for r in result["rows"] if f"along_{axis}" in r), key=lambda r: r["L_over_eta"])
         x, y = ([r[n] for r in own] for n in ("L_over_eta", f"along_{axis}"))
-        right.plot(x, y, "o-", markersize=4, linewidth=1, color=COLOURS[number], label=axis)
+        right.plot(x, y, "osD^"[number], markersize=4, color=COLOURS[number], label=axis)
     right.axhline(1 / 3, color="k", linewidth=1, linestyle=":")
     right.set(xlabel="L/η", ylabel="⟨cos²⟩ with", ylim=(0, 1))
     if any("along_vorticity" in r for r in result["rows"]):

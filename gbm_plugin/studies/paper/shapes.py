@@ -1,9 +1,9 @@
 """Fibers laid over each other with one end at the origin, rigid and flexible, and how isotropic they are: figure 6.
 
-The density of beads around the first bead, in the three projections together, of the straightest family and of the
-most flexible one whose l_p is not shorter than a bead (or of those that --families names). Isotropy of every family:
-the distance of ⟨R R⟩/⟨R²⟩ from a third of the unit tensor, 0 where it is isotropic and 1 for parallel fibers; M
-independent vectors make 1/√M of it by chance, M being at least the number of fibers.
+The density of the fibers around their first bead, in the three projections together, of the straightest family and of
+the most flexible one whose l_p is not shorter than a bead (or of those that --families names). Isotropy of every
+family: the distance of ⟨R R⟩/⟨R²⟩ from a third of the unit tensor, 0 where it is isotropic and 1 for parallel fibers;
+M independent vectors make 1/√M of it by chance, M being at least the number of fibers.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ...statistics.orientation import anisotropy
 from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import steps
 
+WITHIN = (0.25, 0.5, 0.75, 1.0)  # of each link, the places that count
 CELLS = 60  # of a picture, in each direction
 
 
@@ -70,11 +71,13 @@ def _row(family: Family, vectors: NDArray) -> dict:
 
 
 def _density(finished: FinishedRun, family: Family) -> NDArray:
-    """(CELLS, CELLS) beads per cell over their number, of squares as wide as two contour lengths."""
+    """(CELLS, CELLS) places of fibers per cell over the largest number, in a square as wide as two contour lengths."""
     edges = np.linspace(-1.05, 1.05, CELLS + 1) * family.contour
 
     def counted(positions: NDArray) -> NDArray:
-        x = (positions - positions[..., :1, :])[..., 1:, :].reshape(-1, 3)
+        x = positions - positions[..., :1, :]
+        links = np.diff(x, axis=-2)
+        x = np.concatenate([x[..., :-1, :] + part * links for part in WITHIN]).reshape(-1, 3)
         counts = sum(np.histogram2d(x[:, i], x[:, (i + 1) % 3], (edges, edges))[0] for i in range(3))
         return counts[None]
 
@@ -116,5 +119,5 @@ def draw(result: dict) -> Figure:
         axes.set(xlabel="x/L", ylabel="y/L", facecolor="k")
         axes.grid(False)
         axes.set_title(f"{own['family']}: anisotropy {own['anisotropy']:.3f}", fontsize=10)
-    figure.colorbar(image, label="log$_{10}$ density of beads over its largest", shrink=0.8)
+    figure.colorbar(image, label="log$_{10}$ density over its largest", shrink=0.8)
     return figure
