@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,21 +14,30 @@ from PyFoam.LogAnalysis.FoamLogAnalyzer import FoamLogAnalyzer
 MOST = 32 << 20  # bytes of a log, beyond which its middle is left out
 HEAD, TAIL = 64 << 10, 8 << 20  # what is kept of it
 GAP = "bytes left out by gbm run"
+WARNING = re.compile(
+    rb"^--> FOAM Warning[^\n]*\n(?:[ \t]+[^\n]*\n)*", re.MULTILINE
+)  # with what is indented below it
 
 
 def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> None:
-    """Cut the middle out of a log that has more than `most` bytes, and that another process appends to (O_APPEND)."""
+    """Cut the middle out of a log that has more than `most` bytes, and that another process appends to (O_APPEND).
+
+    OpenFOAM's warnings stay, each kind once, as many as have room beside the head.
+    """
     if log.stat().st_size <= most:
         return
     with log.open("a+b") as file:
         file.seek(0)
         first = file.read(head)
         first = first[: first.rfind(b"\n") + 1]
+        file.seek(len(first))
+        middle = file.read(log.stat().st_size - tail - len(first))
+        warnings = b"".join(dict.fromkeys(WARNING.findall(middle)))[:head]
         start = file.seek(-tail, os.SEEK_END)
         last = file.read()
         cut = last.find(b"\n") + 1
         end = file.tell()
-        gap = f"\n[... {start + cut - len(first)} {GAP} ...]\n".encode()
+        gap = f"\n[... {start + cut - len(first) - len(warnings)} {GAP} ...]\n".encode() + warnings
         newest = os.pread(file.fileno(), most, end)  # what came meanwhile
         file.truncate(0)
         file.write(first + gap + last[cut:] + newest)

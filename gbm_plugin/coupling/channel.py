@@ -26,7 +26,8 @@ class Channel(ABC):
         """Exactly this many bytes; CouplingError at the end of the connection or the timeout."""
 
     @abstractmethod
-    def close(self) -> None: ...
+    def close(self) -> int:
+        """How many bytes had come that nobody asked for."""
 
     def send(self, message: Message) -> None:
         self._write(encode_header(message), message.payload)

@@ -82,7 +82,9 @@ def serve(case: Path | str, number: int | None = None) -> None:
             channel.say_why(str(error))
             raise
         finally:
-            channel.close()
+            late = channel.close()
+        if late:
+            raise channel.error(f"END is followed by {late} bytes: what is recorded is kept")
 
 
 def _share(scene: Scene, number: int | None) -> Share:
@@ -273,5 +275,9 @@ class Session:
         return self._observe()
 
     def _goodbye(self, end: Message) -> None:
+        if end.payload:
+            raise self.channel.error(
+                f"END of step {end.step} has {len(end.payload)} bytes, and must be empty"
+            )
         self.channel.send(Message(Kind.GOODBYE, end.step, end.time))
         log.info("time %g: OpenFOAM ended the run; recorded in %s", end.time, self.journal.recorder.path)

@@ -95,16 +95,19 @@ class SocketChannel(Channel):
             view = view[got:]
         return data
 
-    def close(self) -> None:
+    def close(self) -> int:
         """Take what is on its way: bytes that nobody reads would reset the connection before the other side has
         read our last word. For a moment only, however much it sends."""
+        late = 0
         with contextlib.suppress(OSError), self._socket:
             self._socket.shutdown(socket.SHUT_WR)
             end = time.monotonic() + PARTING
             while (left := end - time.monotonic()) > 0:
                 self._socket.settimeout(left)
-                if not self._socket.recv(1 << 16):
-                    return
+                if not (got := len(self._socket.recv(1 << 16))):
+                    break
+                late += got
+        return late
 
 
 def dismiss(connection: socket.socket, text: str) -> None:

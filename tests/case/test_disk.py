@@ -84,6 +84,21 @@ def test_a_log_that_another_process_writes_is_shortened(tmp_path):
     assert tail == sorted(tail)
 
 
+def test_warnings_in_the_middle_of_a_log_are_kept(tmp_path):
+    log = tmp_path / "log"
+    warning = "--> FOAM Warning : \n    From function f()\n    in file f.C at line {}\n    it is {}\n\n"
+    lines = [f"line {n:05d}\n" for n in range(10_000)]
+    for n in range(2000, 4000):
+        lines[n] += warning.format(7, "odd")
+    lines[5000] += warning.format(9, "even odder")
+    log.write_text("".join(lines))
+    for _ in range(2):
+        shorten(log, 20_000, 2000, 5000)
+    text = log.read_text()
+    assert len(text) < 20_000 and text.endswith("line 09999\n")
+    assert text.count("it is odd") == 1 and text.count("it is even odder") == 1
+
+
 def test_the_summary_says_what_it_saw(tmp_path):
     log = tmp_path / "log"
     log.write_text("".join(STEP.format(n) for n in range(1, 2001)))

@@ -164,6 +164,10 @@ SOLVER_FAULTS = {
         lambda s: s.raw(Message(Kind.SAVE, 3, 0.06, b"0.06").encode()),
         "SAVE is of step 3",
     ),
+    "end with a payload": (
+        lambda s: s.raw(Message(Kind.END, 3, 0.06, b"and more").encode()),
+        "END of step 3 has 8 bytes",
+    ),
     "early end": (lambda s: s.raw(Message(Kind.END, 1, 0.02).encode()), "END is of step 1"),
     "error": (
         lambda s: s.raw(Message(Kind.ERROR, 4, 0.08, b"out of coffee").encode()),
@@ -225,6 +229,21 @@ def test_daemon_with_a_solver_on_another_case(change, expected, prepared):
         solver.close()
         line = one_line(solver.daemon, "daemon")
     assert expected in line and "log.pimpleFoam" in line
+
+
+@pytest.mark.parametrize("transport", ["socket", "tcp"])
+def test_daemon_with_a_solver_that_goes_on_after_its_end(transport, copy):
+    prepared = copy(transport, PATIENT)
+    with FakeSolver(prepared) as solver:
+        solver.connect()
+        solver.serve_until(4)
+        solver.raw(Message(Kind.END, 3, 0.06).encode() + b"and more")
+        while solver.receive().kind is not Kind.GOODBYE:
+            pass
+        solver.close()
+        line = one_line(solver.daemon, "daemon")
+    assert "END is followed by 8 bytes: what is recorded is kept" in line
+    assert records(prepared) == 4
 
 
 # --- a daemon that misbehaves, against the real pimpleFoam --------------------------------------------------

@@ -29,11 +29,11 @@ TOO_LONG = "predicted with an error|blown up|not finite|[Ff]loating point|SIGFPE
 def ran(
     application: str,
     courant: float,
-    steps: int = 40,
+    steps: int = 20,
     viscosity: float = 0.01,
     force: str = POWER,
     initial: str = RANDOM,
-    fibers: int = 10,
+    fibers: int = 5,
 ) -> Found:
     """A run of gbm: k at its end over that at its start, and the fibers' length."""
     step = courant * 2 * np.pi / CELLS / SPEED
@@ -82,7 +82,7 @@ def _cases() -> list[Case]:
             ))  # fmt: skip
         cases += [
             Case("OpenFOAM's flow", f"k_max η = 0.5, {application}",
-                 lambda a=application: ran(a, 0.2, 60, viscosity=0.0023), openfoam=True),
+                 lambda a=application: ran(a, 0.2, 40, viscosity=0.0023), openfoam=True),
             Case("forcing", f"constant power, fluid in uniform motion, {application}",
                  lambda a=application: ran(a, 0.2, 5, initial=NOTHING.format(0.5)), "nothing to force", openfoam=True),
             Case("forcing", f"eswaranPope, fluid at rest, {application}",
