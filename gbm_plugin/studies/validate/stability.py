@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Sequence
 from importlib import import_module
 
-from ...fiber.threads import limited_to
+from ...threads import limited_to
 from ..hard.case import Case
 from ..study import option, steps
 
