@@ -41,7 +41,9 @@ class Fibers:
     holds the centre of mass and unit links, so that the length is exact). bending_stiffness: K^b, force ×
     area, one number or (F,); None if young_modulus E is given instead, K^b = E π d⁴/64 (eq. 10). viscosity:
     dynamic, μ. bending_torque: "consistent" (energy-consistent) or "asPrinted" (eq. 6, twice as stiff).
-    curvature_law: "sine" (eq. 4) or "discreteRod" (tan(θ/2)/a). Raises ValueError on anything else.
+    curvature_law: "sine" (eq. 4), whose torque weakens beyond 90° between links and vanishes at a fold, which it does
+    not hold open, or "discreteRod" (tan(θ/2)/a), which resists up to the fold; exactly there neither has a direction.
+    Raises ValueError on anything else.
     """
 
     def __init__(

@@ -56,7 +56,7 @@ class FiberOptions(_Options):
     """What fibers are made of. Raises ModelError, a ValueError.
 
     bending_torque: derived from the bending energy, or eq. (6) as printed, twice as stiff. curvature_law: the
-    paper's, or that of a discrete rod, which resists folding.
+    paper's, which weakens beyond 90° between links, or that of a discrete rod, which resists folding.
     """
 
     bending_torque: str = _word(BENDING_TORQUES)
@@ -70,7 +70,8 @@ class MotionOptions(_Options):
     integrator: third order with sub-steps, implicit of second order, or whichever allows the step. mobility: beads
     each alone, or with each other (Rotne–Prager–Yamakawa). strain_coupling: beads feel the ambient strain through
     each other, with rpy. tolerance, of implicit and auto: bead displacement over fiber length; None: theirs.
-    repulsion [1/s]: rate at which overlaps of beads that are not neighbours decay.
+    repulsion [1/s]: rate at which overlaps of beads that are not neighbours decay; of beads in one place it has no
+    direction, and with rpy they have one mobility and stay together.
     """
 
     integrator: str = _word(INTEGRATORS)

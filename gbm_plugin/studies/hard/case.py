@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ...errors import one_line
+from ...errors import GbmError, one_line
 
 HANDLED = "handled"
 LENGTH = 1e-12  # relative error of bead spacings, times the beads of a fiber, that rounding explains
@@ -44,7 +44,7 @@ class Case:
             warnings.simplefilter("always")
             try:
                 found, message = self.act(), ""
-            except (ValueError, FloatingPointError, RuntimeError, OSError) as error:
+            except (GbmError, ValueError, FloatingPointError, OSError) as error:
                 found, message = {}, one_line(error)
         clock = 1 if self.openfoam else 0
         row["seconds"] = (time.process_time(), time.perf_counter())[clock] - start[clock]
