@@ -24,6 +24,7 @@ Foam::lattice::lattice(const fvMesh& mesh)
     labelList remoteNumbers;
     layOut(remoteSlots, remoteNumbers);
     connect(remoteSlots, remoteNumbers);
+    measureRuns();
     divide();
 }
 
@@ -133,16 +134,36 @@ Foam::List<Foam::DynamicList<Foam::label>> Foam::lattice::candidates
     List<DynamicList<label>> result(Pstream::nProcs());
     result[Pstream::myProcNo()].reserve(points.size());
 
+    // counted and put in the order of their blocks
+    labelList block(points.size());
+    labelList starts(ranks_.size() + 1, Zero);
     forAll(points, p)
     {
-        const Vector<label> i(box_.place(points[p]));
-        const Vector<label> c(coarsePlace(i));
+        const Vector<label> c(coarsePlace(box_.place(points[p])));
+        block[p] = c.x() + nCoarse_.x()*(c.y() + nCoarse_.y()*c.z());
+        ++starts[block[p] + 1];
+    }
+    for (label b = 1; b < starts.size(); ++b)
+    {
+        starts[b] += starts[b - 1];
+    }
+    labelList order(points.size());
+    forAll(points, p)
+    {
+        order[starts[block[p]]++] = p;
+    }
 
-        for
-        (
-            const label rank :
-            ranks_[c.x() + nCoarse_.x()*(c.y() + nCoarse_.y()*c.z())]
-        )
+    for (const label p : order)
+    {
+        const labelList& ranks = ranks_[block[p]];
+        if (ranks.size() == 1)
+        {
+            result[ranks[0]].append(p);
+            continue;
+        }
+
+        const Vector<label> i(box_.place(points[p]));
+        for (const label rank : ranks)
         {
             const Vector<label>& first = blocks_[rank].first();
             const Vector<label>& last = blocks_[rank].second();
@@ -171,7 +192,7 @@ Foam::label Foam::lattice::findCell(const point& p) const
 }
 
 
-const Foam::label* Foam::lattice::around
+Foam::label Foam::lattice::around
 (
     const point& p,
     vector& weights
@@ -187,5 +208,5 @@ const Foam::label* Foam::lattice::around
         weights[d] = x[d] - lower[d];
     }
 
-    return slots_.cdata() + slot(lower);
+    return slot(lower);
 }

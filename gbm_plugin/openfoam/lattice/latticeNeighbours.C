@@ -107,6 +107,26 @@ void Foam::lattice::connect
 }
 
 
+void Foam::lattice::measureRuns()
+{
+    const label nCells = mesh_.nCells();
+    const auto local = [&](const label s)
+    {
+        return slots_[s] >= 0 && slots_[s] < nCells;
+    };
+
+    runs_.setSize(slots_.size());
+    for (label s = slots_.size() - 1; s >= 0; --s)
+    {
+        const bool follows =
+            local(s) && s + 1 < slots_.size()
+         && local(s + 1) && slots_[s + 1] == slots_[s] + 1;
+
+        runs_[s] = follows ? min(runs_[s + 1] + 1, 255) : local(s);
+    }
+}
+
+
 void Foam::lattice::divide()
 {
     Pstream::gatherList(blocks_);

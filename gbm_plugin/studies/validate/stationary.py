@@ -6,6 +6,7 @@ Chaos parts the two flows within a few turnovers, so they are compared by averag
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import os
 import tempfile
@@ -22,7 +23,7 @@ from ..figures import stationary_figure
 from ..scenes import checked_cells, checked_step, scene_copy, three_families
 from ..study import option
 from .averages import BLOCKS, Averages, averages, curve, density
-from .comparison import sampling_word
+from .comparison import application, sampling_word
 
 FLOW = """field random; spectrum peaked; kineticEnergy 0.22; peakWavenumber 2; maxWavenumber 5; seed 1;
 """
@@ -45,6 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, run, "time_step", "of the first mesh, others in proportion [s]")
     option(parser, run, "reference_cells", "of the spectral solver")
     option(parser, run, "turnovers", "k/eps long each, after which averages end")
+    text = "result of an earlier run (--json): its spectral run is the reference, the others stand beside"
+    option(parser, run, "earlier", text, type=Path, metavar="FILE")
 
 
 def run(
@@ -53,22 +56,24 @@ def run(
     time_step: float = 0.06,
     reference_cells: int = 48,
     turnovers: int = 100,
+    earlier: Path | None = None,
 ) -> dict:
     """Averages of OpenFOAM with each number of cells, of the spectral solver with reference_cells, and, where the case
     samples the flow at the beads trilinearly, of a spectral flow on the most cells that is sampled so too, which tells
     an error of sampling from one of the flow.
 
     time_step: that of the first mesh [s]; others take it in proportion to their cells, the spectral solver two
-    thirds of that, as its Adams-Bashforth scheme needs. Two runs at a time where there are cores for it. Raises
-    as `gbm_plugin.run.openfoam.run`, and ValueError where the runs are too short for a standard error.
+    thirds of that, as its Adams-Bashforth scheme needs. earlier: the JSON of another such study, whose runs are taken
+    and not made again, so that other solvers or meshes are set beside them. Two runs at a time where there are cores
+    for it. Raises as `gbm_plugin.run.openfoam.run`, and ValueError where the runs are too short for a standard error.
     """
     checked_cells([*cells, reference_cells] if reference_cells not in cells else cells)
     checked_step(time_step, TURNOVER / RECORDS)
     if turnovers < 2 * BLOCKS:
         raise ValueError(f"turnovers are {turnovers}; {2 * BLOCKS} at least are needed for {BLOCKS} blocks")
     jobs = [("openfoam", n, time_step * cells[0] / n) for n in sorted(cells, reverse=True)]
-    others = [("spectral", reference_cells)]
-    if sampling_word(case) == "trilinear":
+    others = [("spectral", reference_cells)] if earlier is None else []
+    if not earlier and sampling_word(case) == "trilinear":
         others.append(("spectral trilinear", max(cells)))
     jobs[1:1] = [(engine, n, 2 / 3 * time_step * cells[0] / n) for engine, n in others]
     workers = min(2, len(os.sched_getaffinity(0)))
@@ -78,22 +83,34 @@ def run(
     ):
         started = [pool.submit(solve, Path(case), Path(folder), *job, turnovers) for job in jobs]
         results = {job: future.result() for job, future in zip(jobs, started, strict=True)}
-        return compare(results, turnovers)
+        return compare(results, turnovers, json.loads(earlier.read_text())["runs"] if earlier else [])
 
 
-def compare(results: dict[tuple[str, int, float], Path], turnovers: int) -> dict:
-    """The result of `run`, from the folders of its runs by (engine, cells, time step); one run is spectral."""
+def compare(
+    results: dict[tuple[str, int, float], Path], turnovers: int, earlier: Sequence[dict] = ()
+) -> dict:
+    """The result of `run`, from the folders of its runs by (engine, cells, time step) and `runs` of an earlier result;
+    one run of both is spectral."""
     settled = (SETTLING + 1e-6) * TURNOVER
     found = {
         job: averages(folder, job[1], BOX, VISCOSITY, settled, _highest(*job[:2]))
         for job, folder in sorted(results.items())
     }
-    reference = next(a for (engine, _, _), a in found.items() if engine == "spectral")
-    edges = {
-        name: np.linspace(0, np.quantile(values, 0.998), BINS + 1)
-        for name, values in reference.curvature.items()
-    }
-    runs = [_summary(*job, a, reference, edges) for job, a in found.items()]
+    reference = next((a for (engine, _, _), a in found.items() if engine == "spectral"), None)
+    if reference:
+        edges = {
+            name: np.linspace(0, np.quantile(values, 0.998), BINS + 1)
+            for name, values in reference.curvature.items()
+        }
+    else:
+        known = next(run for run in earlier if run["engine"] == "spectral")["curvature"]
+        edges = {name: np.array(curve["edges"]) for name, curve in known.items()}
+    runs = [*earlier]
+    for job, a in found.items():
+        summary = _summary(*job, a, reference, edges)
+        if job[0] == "openfoam":
+            summary["engine"] = application(results[job])
+        runs.append(summary)
     return {
         "turnover": TURNOVER,
         "turnovers": turnovers,
@@ -109,7 +126,7 @@ def _highest(engine: str, cells: int) -> int:
 
 
 def _summary(
-    engine: str, cells: int, time_step: float, a: Averages, reference: Averages, edges: dict
+    engine: str, cells: int, time_step: float, a: Averages, reference: Averages | None, edges: dict
 ) -> dict:
     spectrum = dict(zip(("mean", "error"), (c.tolist() for c in curve(a.spectra)), strict=True))
     summary = {
@@ -127,21 +144,21 @@ def _summary(
             "mean": mean.tolist(),
             "error": error.tolist(),
         }
-    if engine == "openfoam":
+    if engine == "openfoam" and reference:
         summary["mesh reads of spectral flow"] = reference.read_with(BOX / cells, BOX, VISCOSITY)
     return summary
 
 
 def _rows(runs: list[dict]) -> list[dict]:
-    """One row for each number and each shell of E(k): mean and standard error of every run, of OpenFOAM's two
+    """One row for each number and each shell of E(k): mean and standard error of every run, of pimpleFoam's two
     finest meshes extrapolated to cells of size zero at second order, and the deviation of each from the spectral
     run in standard errors of the difference."""
     values = {f"{run['engine']} {run['cells']}": _values(run) for run in runs}
-    meshes = [
-        (run["cells"], values[f"openfoam {run['cells']}"]) for run in runs if run["engine"] == "openfoam"
-    ]
+    meshes = sorted(
+        (run["cells"], values[f"pimpleFoam {run['cells']}"]) for run in runs if run["engine"] == "pimpleFoam"
+    )
     if len(meshes) > 1:
-        values["openfoam, h to 0"] = _extrapolated(*meshes[-2:])
+        values["pimpleFoam, h to 0"] = _extrapolated(*meshes[-2:])
     reference = next(title for title in values if title.startswith("spectral "))
     names = [name for name in values[reference] if all(name in v for v in values.values())]
     rows = []

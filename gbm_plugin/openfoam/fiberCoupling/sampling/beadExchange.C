@@ -116,13 +116,13 @@ Foam::scalarList Foam::beadExchange::collect
     const label n
 ) const
 {
-    // in order already, and not a second list of all
-    const label me = Pstream::myProcNo();
+    // in their places already, and not a second list of all
     if (!Pstream::parRun() && numbers_.size() == brought_)
     {
         return std::move(sampled);
     }
 
+    const label me = Pstream::myProcNo();
     scalarList result(brought_*n);
     label found = 0;
 

@@ -12,18 +12,20 @@ INLINE void sampleAll
 (
     const Interpolant& interpolant,
     const lattice& cells,
-    const UList<point>& points,
+    const beadExchange& beads,
     const ambient wanted,
     stencil u,
-    scalar* out
+    scalarList& values
 )
 {
     const vector perCell(cells.box().perCell());
+    const label n = 3 + components(wanted);
 
-    for (const point& p : points)
+    forAll(beads.points(), i)
     {
+        scalar* out = values.begin() + n*beads.placeOf(i);
         vector x;
-        u.slot = cells.around(p, x);
+        u.slot = cells.around(beads.points()[i], x);
 
         vector d[3];
         const vector velocity
@@ -60,10 +62,10 @@ VECTORISED
 void sampleWith
 (
     const trilinear& interpolant, const lattice& cells,
-    const UList<point>& points, ambient wanted, const stencil& u, scalar* out
+    const beadExchange& beads, ambient wanted, const stencil& u, scalarList& values
 )
 {
-    sampleAll(interpolant, cells, points, wanted, u, out);
+    sampleAll(interpolant, cells, beads, wanted, u, values);
 }
 
 
@@ -71,10 +73,10 @@ VECTORISED
 void sampleWith
 (
     const cubic& interpolant, const lattice& cells,
-    const UList<point>& points, ambient wanted, const stencil& u, scalar* out
+    const beadExchange& beads, ambient wanted, const stencil& u, scalarList& values
 )
 {
-    sampleAll(interpolant, cells, points, wanted, u, out);
+    sampleAll(interpolant, cells, beads, wanted, u, values);
 }
 
 
@@ -82,10 +84,10 @@ VECTORISED
 void sampleWith
 (
     const quintic& interpolant, const lattice& cells,
-    const UList<point>& points, ambient wanted, const stencil& u, scalar* out
+    const beadExchange& beads, ambient wanted, const stencil& u, scalarList& values
 )
 {
-    sampleAll(interpolant, cells, points, wanted, u, out);
+    sampleAll(interpolant, cells, beads, wanted, u, values);
 }
 
 }
@@ -105,15 +107,12 @@ Foam::scalarList Foam::latticeSampler<Interpolant>::sample
     const List<vector> neighbours(lattice_.gather(cells));
     const stencil u
     {
-        nullptr, lattice_.strides(), cells.cdata(), neighbours.cdata(),
-        cells.size()
+        lattice_.slots().cdata(), lattice_.runs().cdata(), 0,
+        lattice_.strides(), cells.cdata(), neighbours.cdata(), cells.size()
     };
 
-    scalarList values(beads.points().size()*(3 + components(wanted)));
-    sampleWith
-    (
-        interpolant, lattice_, beads.points(), wanted, u, values.begin()
-    );
+    scalarList values(beads.nPlaces()*(3 + components(wanted)));
+    sampleWith(interpolant, lattice_, beads, wanted, u, values);
 
     return values;
 }

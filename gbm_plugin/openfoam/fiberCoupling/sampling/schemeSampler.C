@@ -31,7 +31,7 @@ void interpolate
         );
         for (direction c = 0; c < pTraits<Type>::nComponents; ++c)
         {
-            out[i*stride + c] = value[c];
+            out[beads.placeOf(i)*stride + c] = value[c];
         }
     }
 }
@@ -47,7 +47,7 @@ Foam::scalarList Foam::schemeSampler::sample
 ) const
 {
     const label stride = 3 + components(wanted);
-    scalarList values(beads.points().size()*stride);
+    scalarList values(beads.nPlaces()*stride);
     scalar* out = values.begin();
 
     interpolate(scheme_, U, beads, out, stride);
