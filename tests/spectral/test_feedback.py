@@ -175,3 +175,13 @@ def test_the_order_in_time_is_two(integrator):
     for quantity in zip(*ends, strict=True):
         changes = [np.abs(b - a).max() for a, b in itertools.pairwise(quantity)]
         assert np.log2(changes[-2] / changes[-1]) > 1.85, changes
+
+
+def test_the_push_of_points_is_no_blow_up():
+    """From rest, turned round in every step and let go: energy that a force gave, not the scheme."""
+    solver = SpectralSolver(8, 0.01, time_step=0.1)
+    for n in range(6):
+        solver.set_point_forces([[1.0, 2.0, 3.0]], [[5.0 * (-1) ** n, 0, 0]])
+        solver.advance()
+    solver.set_point_forces(None, None)
+    solver.advance(3)

@@ -61,7 +61,7 @@ def _found(case: Path, force: str) -> Found:
     energy = read_dat(case / "postProcessing" / force, f"{force}.dat")["k"]
     found: Found = {
         "finite": bool(np.isfinite(energy).all()),
-        "energy": float(energy[-1] / max(energy[0], 1e-300)),
+        "energy": float(energy[-1] / (energy[0] or 1.0)),
     }
     with open_recording(results(case)) as recording:
         worst = 0.0
@@ -75,7 +75,10 @@ def _cases() -> list[Case]:
     cases = []
     for application, limits in {"boxFoam": (0.3, 1.0, 5.0), "pimpleFoam": (0.3, 1.0, 5.0)}.items():
         for courant in limits:
-            refused = TOO_LONG if courant > 0.5 else None
+            stable = (
+                0.46 if application == "boxFoam" else 1.0
+            )  # pimpleFoam's implicit steps are, at less accuracy
+            refused = TOO_LONG if courant > stable else None
             cases.append(Case(
                 "OpenFOAM's flow", f"Courant number {courant:g}, {application}",
                 lambda a=application, c=courant: ran(a, c), refused, openfoam=True,
