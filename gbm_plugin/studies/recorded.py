@@ -68,6 +68,11 @@ class Flow:
     def taylor_reynolds(self) -> float:
         return taylor_reynolds(self.velocity_rms, self.viscosity, self.dissipation.value)
 
+    @property
+    def large_length(self) -> float:
+        """u'³/ε: of the eddies that hold the energy."""
+        return self.velocity_rms**3 / self.dissipation.value
+
     def persistence(self, stiffness: float, dissipation: float | None = None) -> float:
         """l_p [m], eq. (15)."""
         epsilon = dissipation or self.dissipation.value

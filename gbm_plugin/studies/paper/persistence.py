@@ -82,7 +82,9 @@ def run(
             average = fiber_average(values)
             point = Point(family, average.value, average.error or 0.0, factor, finished.flow.forcing)
             points.append(point)
-            measured.append(_row(point) | {"L_over_eta": family.contour / finished.flow.kolmogorov_length})
+            lengths = {"L_over_eta": family.contour / finished.flow.kolmogorov_length}
+            lengths["L_over_large"] = family.contour / finished.flow.large_length
+            measured.append(_row(point) | lengths)
     fits = list(_fits([p for p in points if p.family.stiffness > 0]))
     return {
         "runs": flows,
@@ -112,27 +114,30 @@ def _transition(measured: list[dict]) -> dict | None:
 
 
 def _trend(measured: list[dict]) -> dict | None:
-    """Exponents of γ ∝ (L/η)^a (L/l_p)^b over the families that are bent: both 0 if eq. (19) with l_p were all. Errors
-    by leaving out one family after the other."""
+    """Exponents of γ ∝ (L/ℓ)^a (L/l_p)^b over the families that are bent, ℓ = u'³/ε: both 0 if eq. (19) with l_p were
+    all. Errors by leaving out one family after the other; rms of ln γ, and what it is with η in the place of ℓ."""
     bent = [r for r in measured if r["fitted"] and r["gamma"] and r["L_over_l_p"] >= BENT]
     if len(bent) < 5:
         return None
-    x = np.log([[r["L_over_eta"], r["L_over_l_p"], np.e] for r in bent])
     y = np.log([r["gamma"] for r in bent])
 
-    def solve(rows: NDArray) -> NDArray:
-        return np.linalg.lstsq(x[rows], y[rows], rcond=None)[0][:2]
+    def solve(scale: str, chosen: NDArray) -> tuple[NDArray, float]:
+        x = np.array([[np.log(r[scale]), np.log(r["L_over_l_p"]), 1.0] for r in bent])
+        found = np.linalg.lstsq(x[chosen], y[chosen], rcond=None)[0]
+        return found[:2], float(np.sqrt(np.mean((y - x @ found) ** 2)))
 
     every = np.arange(len(y))
-    parts = np.array([solve(every != i) for i in every])
+    parts = np.array([solve("L_over_large", every != i)[0] for i in every])
     error = np.sqrt((len(y) - 1) / len(y) * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
-    whole = solve(every >= 0)
+    whole, rms = solve("L_over_large", every >= 0)
     return {
         "families": len(bent),
-        "exponent_of_L_over_eta": float(whole[0]),
-        "error_of_L_over_eta": float(error[0]),
+        "exponent_of_L_over_large": float(whole[0]),
+        "error_of_L_over_large": float(error[0]),
         "exponent_of_L_over_l_p": float(whole[1]),
         "error_of_L_over_l_p": float(error[1]),
+        "rms": rms,
+        "rms_with_eta": solve("L_over_eta", every >= 0)[1],
     }
 
 
@@ -170,8 +175,9 @@ def _fits(points: list[Point]) -> Iterator[dict]:
     yield from _fitted("L/l_p from 5 on", [p for p in usual if p.family.stretch >= 5])
     yield from _fitted("L/l_p from 5 to 10", [p for p in usual if 5 <= p.family.stretch < 10])
     yield from _fitted("L/l_p from 10 on", [p for p in usual if p.family.stretch >= 10])
-    for beads in sorted({p.family.beads for p in usual}):
-        yield from _fitted(f"N = {beads}", [p for p in usual if p.family.beads == beads])
+    twins = _with_other_beads([p for p in points if LEAST <= p.family.stretch < np.inf])
+    for beads in sorted({p.family.beads for p in twins}):
+        yield from _fitted(f"N = {beads}, of one fiber", [p for p in twins if p.family.beads == beads])
     for stiffness in sorted({p.family.stiffness for p in usual}):
         yield from _fitted(f"K^b = {stiffness:g}", [p for p in usual if p.family.stiffness == stiffness])
     yield from _fitted("each family alike", usual, alike=True)
@@ -198,6 +204,14 @@ def _fits(points: list[Point]) -> Iterator[dict]:
                 "error": None,
                 "points": len(usual),
             } | {"scatter": rms}
+
+
+def _with_other_beads(points: list[Point]) -> list[Point]:
+    """Those of a fiber (length and K^b) that the same run has with other numbers of beads too."""
+    found: dict[tuple, list[Point]] = {}
+    for p in points:
+        found.setdefault((p.family.run, f"{p.family.length:.6g}", p.family.stiffness), []).append(p)
+    return [p for own in found.values() if len({p.family.beads for p in own}) > 2 for p in own]
 
 
 def _fitted(
@@ -269,9 +283,10 @@ def table(result: dict) -> str:
         )
     if t := result["trend"]:
         lines.append(
-            f"γ of the {t['families']} families with L/l_p ≥ {BENT:g} ∝ (L/η)^({t['exponent_of_L_over_eta']:.2f} ± "
-            f"{t['error_of_L_over_eta']:.2f}) (L/l_p)^({t['exponent_of_L_over_l_p']:.2f} ± "
-            f"{t['error_of_L_over_l_p']:.2f})"
+            f"γ of the {t['families']} families with L/l_p ≥ {BENT:g} ∝ "
+            f"(Lε/u'³)^({t['exponent_of_L_over_large']:.2f} ± "
+            f"{t['error_of_L_over_large']:.2f}) (L/l_p)^({t['exponent_of_L_over_l_p']:.2f} ± "
+            f"{t['error_of_L_over_l_p']:.2f}), rms of ln {t['rms']:.3f}; with L/η {t['rms_with_eta']:.3f}"
         )
     return "\n".join(lines)
 
