@@ -244,7 +244,7 @@ def _info(arguments) -> dict:
     scene = read_scene(arguments.case)
     result = figures(scene)
     print(describe(result))
-    result["notes"] = [*notes(scene), *filter(None, [difference(scene.case)])]
+    result["notes"] = [*notes(scene, judged=False), *filter(None, [difference(scene.case)])]
     for note in result["notes"]:
         print(f"note: {note}")
     return result

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from ..errors import CaseError
 from .dictionary import Dictionary
-from .info import figures
+from .expected import expected
 from .layout import processors, velocity_file
 from .scene import Scene
 from .syntax import SyntaxFault, parse, tokens
+from .verdict import WRONG, verdicts
 
 LIBRARY = "gbmPlugin"
 WITHOUT_OPTIONS = ("icoFoam", "dnsFoam")  # solvers that never look at fvOptions
@@ -139,10 +140,11 @@ def check_forcing(scene: Scene, time: str) -> None:
         )
 
 
-def notes(scene: Scene) -> list[str]:
-    """What a user should know of a case that runs."""
+def notes(scene: Scene, judged: bool = True) -> list[str]:
+    """What a user should know of a case that runs. judged: with what is wrong of the numbers that `gbm info` judges."""
     found = []
-    result = figures(scene)
+    flow = expected(scene)
+    numbers = {v.name: v for v in verdicts(scene, flow)}
     if scene.box:
         half = min(scene.box) / 2
         found += [
@@ -151,11 +153,16 @@ def notes(scene: Scene) -> list[str]:
             for f in scene.families
             if f.length > half
         ]
-    ratio = result["flow"].get("cell_over_eta")
-    if ratio and ratio > RESOLVED:
+    ratio = numbers["dx/eta"].value if "dx/eta" in numbers else 0.0
+    if ratio > RESOLVED:
         found.append(
             f"cells are {ratio:.2g} Kolmogorov lengths wide, more than {RESOLVED:g}: small eddies are not resolved"
         )
+    found += [
+        f"{v.name} is {v.value:.3g}, wrong ({v.asked}): change to {v.change}"
+        for v in numbers.values()
+        if judged and v.grade == WRONG and v.name not in ("dx/eta", "L/box")
+    ]
     writes = (scene.end_time - scene.start_time) / scene.write_interval
     if abs(writes - round(writes)) > 1e-3:  # also with an interval beyond the end
         found.append(

@@ -12,16 +12,20 @@ from .scene import Scene
 
 log = logging.getLogger(__name__)
 
-NEWEST, OLDER = (
-    7,
-    6,
-)  # numbers for each cell that OpenFOAM writes: U, p, phi; U_0, phi_0 of schemes that remember
+# numbers for each cell that OpenFOAM writes: U; U, p, phi; U_0, phi_0 of schemes that remember
+VELOCITY, NEWEST, OLDER = 3, 7, 6
 REMEMBER = ("backward", "CrankNicolson", "localEuler")
 MODES = 9  # numbers for each cell in uniform/boxFoam, in binary: of the velocity and of two earlier rates
 BINARY, SIGNS = 8, 6  # bytes of a number in binary; sign, point, exponent and a space beside its digits
 STATE, CLOUD, RECORD = 290, 110, 24  # bytes for each bead: fibers.npz, the cloud beside the fields, a record
 TABLES = 600  # bytes of a step in all tables of postProcessing
 LOG = 2000  # and in the log of the solver
+
+
+def writes(scene: Scene, start: float | None = None) -> int:
+    """Time folders that a run from `start` (default: startTime) writes; 1 where OpenFOAM decides by other clocks."""
+    span = max(0.0, scene.end_time - (scene.start_time if start is None else start))
+    return math.floor(span / scene.write_interval + 1e-6) if math.isfinite(scene.write_interval) else 1
 
 
 def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
@@ -31,10 +35,10 @@ def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
     span = max(0.0, scene.end_time - (scene.start_time if start is None else start))
     steps = span / scene.time_step
     beads = sum(f.count * f.beads for f in scene.families)
-    writes = math.floor(span / scene.write_interval + 1e-6) if math.isfinite(scene.write_interval) else 1
+    count = writes(scene, start)
     keep = control.integer("purgeWrite", 0, least=0)
     folder = _cell_bytes(scene, control) * math.prod(scene.cells or (0,)) + (STATE + CLOUD) * beads
-    folders = folder * (min(writes, keep) if keep else writes)
+    folders = folder * (min(count, keep) if keep else count)
     recording = (RECORD + 8 * len(scene.record)) * beads * math.ceil(steps / scene.record_interval)
     tables = TABLES * steps + min(MOST, LOG * steps)
     parts = {
@@ -47,8 +51,8 @@ def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
 
 
 def _cell_bytes(scene: Scene, control: Dictionary) -> float:
-    numbers = NEWEST
     own = scene.application == "boxFoam"
+    numbers = VELOCITY if own and not control.switch("writePressure", True) else NEWEST
     if not own and (scene.case / "system/fvSchemes").is_file():
         schemes = Dictionary.read(scene.case, "system/fvSchemes")
         ddt = str(schemes.sub("ddtSchemes", {}).raw("default", ""))

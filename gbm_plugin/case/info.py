@@ -1,124 +1,173 @@
-"""What a case contains, and the numbers that tell whether the bead model holds in it (`gbm info`)."""
+"""What a scene will do, what it takes, and whether its numbers suffice (`gbm info`), on one screen."""
 
 from __future__ import annotations
 
-import math
 import shutil
+import textwrap
 from dataclasses import asdict
 
-from ..scales import kolmogorov_length
-from . import solver
+from . import plan
+from .cost import cost
 from .disk import needed, readable
+from .expected import Expected, expected
 from .scene import Family, Scene
+from .verdict import GOOD, Verdict, persistence_length, step_limit, sub_steps, verdicts
 
-# beyond these a bead is no longer a passive point of the flow around it
-BEAD_SIZE_LIMIT, STOKES_LIMIT, PERSISTENCE_LIMIT = 5.0, 1.0, 1.0
+WIDTH = 80  # columns of a screen
+NAMES, WHY = 11, 24  # of them for what a line is about, and for why
+FAMILIES = 4  # so many have a line
+PARTS = ("start", "flow", "fibers", "coupling", "writing")  # of the time
 
 
 def figures(scene: Scene) -> dict:
-    """Key figures of a scene, SI units. Those that need the dissipation rate are None where the forcing
-    does not fix it (it is the input power of constantPower)."""
-    dissipation = scene.forcing.values.get("power") if scene.forcing else None
-    flow = {
-        "solver": solver.meaning(scene),
+    """Key figures of a scene, SI units, as numbers and lists of them. What needs the flow's dissipation rate is None
+    where the case does not tell it."""
+    flow = expected(scene)
+    families = {f.name: _family(f, scene, flow) for f in scene.families}
+    disk = needed(scene) | {"free": shutil.disk_usage(scene.case).free}
+    return {
+        "case": scene.case.resolve().name,
+        "flow": _flow(scene, flow),
+        "families": families,
+        "computes": [asdict(item) for item in plan.computed(scene)],
+        "left_out": plan.left_out(scene),
+        "exchanges": asdict(plan.exchanged(scene)),
+        "stores": [asdict(item) for item in plan.stored(scene)],
+        "cost": asdict(cost(scene)),
+        "disk": disk,
+        "verdicts": [asdict(v) for v in verdicts(scene, flow)],
+    }
+
+
+def _flow(scene: Scene, flow: Expected) -> dict:
+    result = {
+        "solver": scene.application,
         "viscosity": scene.kinematic_viscosity,
         "density": scene.density,
         "box": scene.box,
         "cells": scene.cells,
         "time_step": scene.time_step,
+        "start_time": scene.start_time,
         "end_time": scene.end_time,
         "forcing": asdict(scene.forcing) if scene.forcing else None,
-        "dissipation": dissipation,
-        "kolmogorov_length": _kolmogorov(scene, dissipation),
+        "velocity_rms": flow.velocity,
+        "largest_speed": flow.speed,
+        "dissipation": flow.dissipation,
+        "dissipation_from": flow.source,
+        "kolmogorov_length": flow.kolmogorov_length,
+        "kolmogorov_time": flow.kolmogorov_time,
     }
     if scene.box and scene.cells:
-        flow["cell_size"] = max(b / n for b, n in zip(scene.box, scene.cells, strict=True))
-        if dissipation:
-            flow["cell_over_eta"] = flow["cell_size"] / flow["kolmogorov_length"]
-    families = {f.name: _family(f, scene, dissipation) for f in scene.families}
-    return {"flow": flow, "families": families, "disk": _disk(scene)}
+        result["cell_size"] = max(b / n for b, n in zip(scene.box, scene.cells, strict=True))
+        if flow.kolmogorov_length:
+            result["cell_over_eta"] = result["cell_size"] / flow.kolmogorov_length
+    return result
 
 
-def _disk(scene: Scene) -> dict:
-    """What a run from startTime writes, and what is free [bytes]."""
-    disk = needed(scene) | {"free": shutil.disk_usage(scene.case).free}
-    short = disk["total"] > disk["free"]
-    return disk | {"remarks": ["the disk has not the room for all that this run writes"] if short else []}
-
-
-def _kolmogorov(scene: Scene, dissipation: float | None) -> float | None:
-    return kolmogorov_length(scene.kinematic_viscosity, dissipation) if dissipation else None
-
-
-def _family(f: Family, scene: Scene, dissipation: float | None) -> dict:
-    mu = scene.dynamic_viscosity
+def _family(f: Family, scene: Scene, flow: Expected) -> dict:
     diameter = 2 * f.radius
-    stiff = f.bending_stiffness > 0
-    limit = mu * diameter**4 / f.bending_stiffness if stiff else None  # eq. (10)
     result = {
         "count": f.count,
         "beads": f.beads,
         "length": f.length,
         "diameter": diameter,
         "bending_stiffness": f.bending_stiffness,
-        "time_step_limit": limit,
-        "sub_steps": max(1, math.ceil(scene.time_step / limit)) if stiff else 1,
+        "time_step_limit": step_limit(f, scene),
+        "sub_steps": sub_steps(f, scene),
     }
-    if dissipation:
-        eta = _kolmogorov(scene, dissipation)
-        persistence = f.bending_stiffness**0.25 / (mu * scene.density * dissipation) ** 0.125  # eq. (15)
+    if flow.dissipation:
+        size = diameter / flow.kolmogorov_length
+        persistence = persistence_length(f, scene, flow.dissipation)
         result |= {
             "persistence_length": persistence,
-            "length_over_persistence": f.length / persistence if stiff else None,
+            "length_over_persistence": f.length / persistence if persistence else None,
             "persistence_over_diameter": persistence / diameter,
-            "diameter_over_eta": diameter / eta,
-            "bead_reynolds": (diameter / eta) ** 2,  # shear rate sqrt(eps/nu) times d^2/nu
-            "bead_stokes": (diameter / eta) ** 2 / 18,  # neutrally buoyant, against the Kolmogorov time
-            "remarks": _remarks(diameter / eta, persistence / diameter if stiff else None),
+            "diameter_over_eta": size,
+            "bead_reynolds": size**2,  # shear rate sqrt(eps/nu) times d^2/nu
+            "bead_stokes": size**2 / 18,  # neutrally buoyant, against the Kolmogorov time
         }
     return result
 
 
-def _remarks(size: float, persistence: float | None) -> list[str]:
-    remarks = []
-    if size > BEAD_SIZE_LIMIT:
-        remarks.append(f"beads are {size:.1f} Kolmogorov lengths wide: the flow varies across a bead")
-    if size**2 / 18 > STOKES_LIMIT:
-        remarks.append(f"the bead Stokes number is {size**2 / 18:.1f}: beads do not follow the flow at once")
-    if persistence is not None and persistence < PERSISTENCE_LIMIT:
-        remarks.append(f"the persistence length is {persistence:.2f} beads: more beads would bend further")
-    return remarks
-
-
 def describe(result: dict) -> str:
-    """The figures as text."""
-    lines = []
-
-    def table(title: str, values: dict) -> None:
-        lines.append(title)
-        for name, value in values.items():
-            if value is None or name in ("remarks", "forcing"):
-                continue
-            text = f"{value:.6g}" if isinstance(value, float) else " ".join(map(_short, _listed(value)))
-            lines.append(f"    {name.replace('_', ' '):<28}{text}")
-        lines.extend(f"    note: {remark}" for remark in values.get("remarks", []))
-
-    flow = result["flow"]
-    table("flow (SI units)", flow)
-    if flow["forcing"]:
-        words = " ".join(f"{k} {v}" for k, v in flow["forcing"]["values"].items())
-        lines.append(f"    {'forcing':<28}{flow['forcing']['type']}: {words}")
-    for name, values in result["families"].items():
-        table(f"family {name}", values)
-    disk = result["disk"]
-    sizes = {name: readable(size) for name, size in disk.items() if name != "remarks"}
-    table("disk, about", sizes | {"remarks": disk["remarks"]})
+    """The figures as one screen of text."""
+    flow, disk, cost = result["flow"], result["disk"], result["cost"]
+    cells = " x ".join(map(str, flow["cells"] or ())) or "its own mesh of"
+    fibers = sum(f["count"] for f in result["families"].values())
+    steps = round((flow["end_time"] - flow["start_time"]) / flow["time_step"])
+    lines = [
+        f"{result['case']}: {cells} cells, {fibers} fibers, "
+        f"t = {flow['start_time']:g} to {flow['end_time']:g} s in {steps} steps",
+        "",
+        f"{'computes':<{WIDTH - WHY + 1}}asked for by",
+    ]
+    items, first = result["computes"], len(result["families"])
+    shown = items[: len(items) - first - 1] + items[-first - 1 : -1][:FAMILIES]
+    for item in shown:
+        lines += _row(**item)
+    if first > FAMILIES:
+        lines += _row("", f"and {first - FAMILIES} more families", "")
+    lines += _row(**items[-1])
+    if result["left_out"]:
+        lines += textwrap.wrap(f"not, as nothing asks: {', '.join(result['left_out'])}", WIDTH - 2,
+                               initial_indent="  ", subsequent_indent="    ")  # fmt: skip
+    lines += ["", *_row(**result["exchanges"], indent="")]
+    for item in result["stores"]:
+        lines += _row(**item, indent="" if item["what"] else "  ")
+    lines += _takes(cost, disk)
+    lines += ["", *_about(flow)]
+    for v in result["verdicts"]:
+        lines += _verdict(Verdict(**v))
     return "\n".join(lines)
 
 
-def _listed(value) -> tuple:
-    return tuple(value) if isinstance(value, tuple | list) else (value,)
+def _row(what: str, how: str, why: str, indent: str = "  ") -> list[str]:
+    """A thing, in words that may take several lines, and why."""
+    room = WIDTH - 2 - NAMES - WHY
+    parts, reasons = _wrapped(how, room) or [""], _wrapped(why, WHY - 1) or [""]
+    rows = max(len(parts), len(reasons))
+    parts, reasons = (column + [""] * (rows - len(column)) for column in (parts, reasons))
+    names = [f"{indent}{what}", *[""] * (rows - 1)]
+    pairs = zip(names, parts, reasons, strict=True)
+    return [f"{name:<{NAMES + 1}} {part:<{room}} {reason}".rstrip() for name, part, reason in pairs]
 
 
-def _short(value) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _takes(cost: dict, disk: dict) -> list[str]:
+    time = "a time that no measurement tells"
+    if cost["total"] is not None:
+        parts = ", ".join(f"{name} {_seconds(cost[name])}" for name in PARTS if cost[name])
+        hidden = "" if cost["fibers"] else "; the flow hides the fibers"
+        time = f"about {_seconds(cost['total'])} on this machine, idle: {parts}{hidden}"
+    room = f"disk {readable(disk['total'])}, {readable(disk['free'])} are free"
+    text = f"{time}; memory {readable(cost['memory'])}; {room}"
+    if disk["total"] > disk["free"]:
+        text += ": wrong, it has not the room; → a larger writeInterval (controlDict)"
+    rows = _wrapped(text, WIDTH - NAMES - 2)
+    return [f"{'takes' if n == 0 else '':<{NAMES + 1}} {row}" for n, row in enumerate(rows)]
+
+
+def _about(flow: dict) -> list[str]:
+    if not flow["dissipation"]:
+        return ["the case does not tell how fast its flow dissipates: its scales are not judged"]
+    numbers = f"eps {flow['dissipation']:.2g} m2/s3 ({flow['dissipation_from']})"
+    numbers += f", eta {flow['kolmogorov_length']:.2g} m, tau_eta {flow['kolmogorov_time']:.2g} s"
+    if flow["velocity_rms"]:
+        numbers += f", u' {flow['velocity_rms']:.2g} m/s"
+    return textwrap.wrap(f"expects {numbers}", WIDTH, subsequent_indent="  ")
+
+
+def _verdict(v: Verdict) -> list[str]:
+    text = v.asked if v.grade == GOOD else f"{v.asked}; → {v.change}"
+    head = f"  {v.name:<{NAMES}}{v.value:<9.3g}{v.grade:<10}"
+    rows = _wrapped(text, WIDTH - len(head))
+    return [f"{head if n == 0 else ' ' * len(head)}{row}" for n, row in enumerate(rows)]
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, width, break_on_hyphens=False)
+
+
+def _seconds(time: float) -> str:
+    if time < 60:
+        return f"{time:.2g} s"
+    return f"{time / 60:.2g} min" if time < 3600 else f"{time / 3600:.2g} h"

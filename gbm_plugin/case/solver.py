@@ -13,6 +13,23 @@ DIFFERENCES = {"central2": ("second", 0.72), "central4": ("fourth", 0.53), "cent
 SECOND = {"central2": (1.0,), "central4": (4 / 3, -1 / 12), "central6": (3 / 2, -3 / 20, 1 / 90)}
 
 
+def scheme(scene: Scene) -> str:
+    """The solver's order, in few words."""
+    if scene.application != "boxFoam":
+        return "finite volumes, by fvSchemes and fvSolution"
+    box = Dictionary.read(scene.case, "system/fvSchemes").sub("boxSchemes", {})
+    order, _ = DIFFERENCES[box.word("differences", DIFFERENCES, "central6")]
+    return f"{order} order in space, third in time"
+
+
+def stable_courant(scene: Scene) -> float | None:
+    """The Courant number up to which the solver is stable; None where it is implicit."""
+    if scene.application != "boxFoam":
+        return None
+    box = Dictionary.read(scene.case, "system/fvSchemes").sub("boxSchemes", {})
+    return DIFFERENCES[box.word("differences", DIFFERENCES, "central6")][1]
+
+
 def meaning(scene: Scene) -> str:
     """One line about the case's solver. CaseError for differences that boxFoam does not have."""
     if scene.application != "boxFoam":

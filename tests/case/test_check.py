@@ -150,7 +150,7 @@ def test_nothing_to_force_in_the_other_engine(case):
 def test_worth_a_word(case):
     """A fiber longer than half the box; cells of 3 Kolmogorov lengths (nu = 0.01, P = 0.05: eta = 0.067); LES."""
     fibers = case / "constant/fiberProperties"
-    fibers.write_text(fibers.read_text().replace("length 1.2", "length 3.2"))
+    fibers.write_text(fibers.read_text().replace("length 1.2", "length 3.2").replace("beads 6", "beads 40"))
     (case / "constant/turbulenceProperties").write_text(HEADER + "simulationType LES;")
     said = notes(read_scene(case))
     assert len(said) == 3

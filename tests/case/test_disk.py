@@ -62,7 +62,7 @@ def test_a_word_before_the_disk_is_full(tmp_path, monkeypatch, caplog):
         said.append(len(caplog.records))
     assert said == [0, 1, 1, 2, 2]
     assert f"{readable(0.5 * need['total'])} left" in caplog.records[0].getMessage()
-    assert "not the room" in describe(figures(scene))
+    assert "not the room" in " ".join(describe(figures(scene)).split())
 
 
 def test_a_log_that_another_process_writes_is_shortened(tmp_path):

@@ -1,14 +1,24 @@
-"""`gbm info`: the numbers that tell whether the model holds, against their definitions."""
+"""`gbm info`: the numbers that tell whether the model holds, against their definitions; the verdicts; one screen."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gbm_plugin.case.info import figures
+from gbm_plugin.case import cost as cost_module
+from gbm_plugin.case import verdict
+from gbm_plugin.case.check import notes
+from gbm_plugin.case.cost import cost
+from gbm_plugin.case.expected import expected
+from gbm_plugin.case.info import describe, figures
+from gbm_plugin.case.new import PRESETS, new_case
 from gbm_plugin.case.scene import read_scene
+from gbm_plugin.case.verdict import verdicts
+from gbm_plugin.cli import main
+from gbm_plugin.fiber import stepper
 
 from conftest import gbm, make_case, set_entry
 
@@ -20,6 +30,11 @@ def path(tmp_path):
     path = make_case(tmp_path / "case", cells=128, prepared=False, families=families, fv_options=power)
     set_entry(path / "constant/transportProperties", "nu", "0.001")
     return path
+
+
+def judged(path, **changes):
+    scene = replace(read_scene(path), **changes)
+    return {v.name: v for v in verdicts(scene, expected(scene))}
 
 
 def test_flow_one_of_the_paper(path):
@@ -39,13 +54,148 @@ def test_flow_one_of_the_paper(path):
 def test_the_command_says_them(path, tmp_path):
     done = gbm("info", path, "--json", tmp_path / "figures.json")
     assert done.returncode == 0, done.stderr
-    assert "kolmogorov length           0.028" in done.stdout
+    assert "eta 0.029 m" in done.stdout and "eps 0.0015 m2/s3 (the power)" in done.stdout
     assert json.loads((tmp_path / "figures.json").read_text())["families"]["one"]["sub_steps"] == 2
 
 
-def test_a_bead_too_large_is_remarked(path):
+@pytest.mark.parametrize("preset", PRESETS)
+def test_it_is_one_screen(tmp_path, preset):
+    """80 columns, at most 45 lines; what is not good says what to change."""
+    result = figures(read_scene(new_case(tmp_path / "mycase", preset)))
+    lines = describe(result).splitlines()
+    assert max(map(len, lines)) <= 80 and len(lines) <= 45
+    assert all(v["change"] for v in result["verdicts"] if v["grade"] != "good")
+    if not preset.startswith(
+        "flow-II"
+    ):  # whose flow is the other engine's, and whose fibers are as wide as the paper's
+        assert all(v["grade"] != "wrong" for v in result["verdicts"])
+
+
+def test_verdicts_and_the_line_to_change(path):
+    """Each is wrong where the number says so, and good once the line that it names is changed."""
+    found = judged(path)
+    assert found["d/eta"].grade == "doubtful" and found["dx/eta"].grade == "good"
+    coarse = judged(path, cells=(40, 40, 40))["dx/eta"]
+    assert coarse.grade == "wrong" and coarse.value == pytest.approx(2 * np.pi / 40 / 0.0286, rel=2e-3)
+    cells = int(coarse.change.split()[1])
+    assert judged(path, cells=(cells,) * 3)["dx/eta"].grade == "good"
+    assert judged(path, cells=(cells - 4,) * 3)["dx/eta"].grade == "doubtful"
+    late = judged(path, time_step=0.5)["dt/tau_eta"]
+    assert late.value == pytest.approx(0.5 / np.sqrt(1e-3 / 1.5e-3)) and late.grade == "wrong"
+    assert judged(path, time_step=float(late.change.split()[1]))["dt/tau_eta"].grade == "good"
+    fast = judged(path, application="boxFoam", time_step=0.1)["Courant"]
+    assert fast.grade == "wrong"
+    step = float(fast.change.split()[1])
+    assert judged(path, application="boxFoam", time_step=step)["Courant"].grade == "good"
+
+
+@pytest.mark.parametrize(
+    "entry, name, grade",
+    [
+        ("length 8", "d/eta", "wrong"),
+        ("length 8", "L/box", "wrong"),
+        ("length 4", "L/box", "doubtful"),
+        ("length 2; integrator implicit", "sub-steps", "good"),
+    ],
+)
+def test_what_a_family_is_told(path, entry, name, grade):
     fibers = path / "constant/fiberProperties"
-    fibers.write_text(fibers.read_text().replace("length 2", "length 8"))
-    remarks = figures(read_scene(path))["families"]["one"]["remarks"]
-    assert any("Kolmogorov lengths wide" in r for r in remarks)
-    assert any("Stokes" in r for r in remarks)
+    fibers.write_text(fibers.read_text().replace("length 2", entry))
+    assert judged(path)[name].grade == grade
+
+
+def test_too_stiff_for_ab3_and_too_soft_for_its_beads(path):
+    fibers = path / "constant/fiberProperties"
+    text = fibers.read_text()
+    fibers.write_text(text.replace("1e-5", "1"))
+    verdict = judged(path)["sub-steps"]
+    assert verdict.grade == "doubtful" and "integrator auto" in verdict.change
+    fibers.write_text(text.replace("1e-5", "1e-9"))
+    assert judged(path)["l_p/2a"].grade == "wrong"
+
+
+def test_a_wrong_number_is_noted_when_it_runs(path):
+    set_entry(path / "system/controlDict", "deltaT", "0.5")
+    said = notes(read_scene(path))
+    assert any(
+        n.startswith("dt/tau_eta is 0.612, wrong") and n.endswith("change to deltaT 0.12 (controlDict)")
+        for n in said
+    )
+
+
+def test_dissipation_of_each_forcing(path):
+    """Given by constantPower; u'^3/eps = 0.19 box with a coefficient; by Eswaran & Pope about that of Flow I; from the
+    initial field without any: nu times its enstrophy at least."""
+    options = path / "constant/fvOptions"
+    head = options.read_text().partition("linearForcing")[0]
+    assert expected(read_scene(path)).dissipation == 0.0015
+    options.write_text(f"{head}f {{ type linearForcing; mode constantCoefficient; A 0.1; }}")
+    flow = expected(read_scene(path))
+    assert flow.dissipation == pytest.approx(3 * 0.1 * flow.velocity**2)
+    assert flow.velocity**3 / flow.dissipation == pytest.approx(0.19 * 2 * np.pi)
+    options.write_text(f"{head}f {{ type eswaranPope; variance 5.53e-7; timeScale 7.65; cutoff 3.4641; }}")
+    assert expected(read_scene(path)).dissipation == pytest.approx(0.0015, rel=0.2)
+    options.unlink()
+    set_entry(path / "constant/transportProperties", "nu", "10")
+    (path / "system/initialFieldDict").write_text("FoamFile { } field ABC; A 1; B 1; C 1;")
+    flow = expected(read_scene(path))
+    assert flow.dissipation == pytest.approx(10 * 3)  # nu <omega^2>, curl u = u
+    assert flow.velocity == pytest.approx(1)
+    assert 3 < flow.speed <= 3 * 2**0.5 * 1.01
+
+
+def test_a_flow_that_nothing_tells_of_is_not_judged(path):
+    (path / "constant/fvOptions").unlink()
+    (path / "system/initialFieldDict").unlink()
+    result = figures(read_scene(path))
+    assert result["flow"]["kolmogorov_length"] is None
+    assert {v["name"] for v in result["verdicts"]} == {"sub-steps", "L/box"}
+    assert "its scales are not judged" in describe(result)
+
+
+def test_what_is_done_and_why(path):
+    """A choice and its reason for each, and what nothing asks for."""
+    fibers = path / "constant/fiberProperties"
+    fibers.write_text(
+        fibers.read_text().replace("integrator ab3;", "integrator auto; record (tension);")
+        .replace("length 2;", "length 2; mobility rpy; strainCoupling yes;")
+    )  # fmt: skip
+    result = figures(read_scene(path))
+    family, sampling = result["computes"][-2:]
+    assert "RPY" in family["how"] and "strain" in family["how"] and family["why"] == "auto: eq. (10) asks 2"
+    assert "gradient" in sampling["how"] and sampling["why"] == "one: strainCoupling"
+    assert result["exchanges"]["how"].startswith("960 B out, 3.84 kB back")  # 40 beads: 24 and 96 bytes each
+    assert result["left_out"] == ["repulsion", "statistics on the fly", "feedback"]
+    assert any("tension" in item["how"] for item in result["stores"])
+
+
+def test_the_estimate_follows_the_work(path, monkeypatch):
+    """Twice the steps, twice the time but for the start; cells, beads and sub-steps each in proportion."""
+    scene = read_scene(path)
+    scene = replace(scene, application="boxFoam", write_interval=np.inf)
+    once, twice = (cost(replace(scene, end_time=t), slower=1.0) for t in (4.0, 8.0))
+    for part in ("flow", "coupling"):
+        assert getattr(twice, part) == pytest.approx(2 * getattr(once, part))
+    assert twice.start == once.start
+    assert cost(replace(scene, end_time=4.0), slower=3.0).flow == pytest.approx(3 * once.flow)
+    large = cost(replace(scene, cells=(256, 256, 256), end_time=4.0), slower=1.0)
+    assert large.flow == pytest.approx(8 * once.flow, rel=0.05)
+    assert cost(replace(scene, application="icoFoam"), slower=1.0).total is None
+    monkeypatch.setattr(cost_module.os, "sched_getaffinity", lambda _: {0})  # a core for both sides
+    stiff = replace(scene.families[0], bending_stiffness=1.0, count=1000)
+    softer = replace(stiff, bending_stiffness=0.5)
+    hard, half = (
+        cost(replace(scene, families=(f,), end_time=4.0), slower=1.0).fibers for f in (stiff, softer)
+    )
+    assert hard == pytest.approx(2 * half, rel=0.01)
+
+
+def test_it_takes_a_moment(path, capsys):
+    """The measurement of the machine is repeated transforms, and nothing that needs compiled kernels."""
+    assert main(["info", str(path)]) == 0
+    assert "on this machine, idle" in capsys.readouterr().out
+    assert 0.05 < cost_module.machine() < 50
+
+
+def test_auto_goes_over_where_the_stepper_does():
+    assert verdict.AFFORDABLE == stepper.AFFORDABLE

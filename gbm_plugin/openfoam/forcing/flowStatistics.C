@@ -182,12 +182,6 @@ scalar totalDissipation(const volVectorField& U, const vector& mean)
 }
 
 
-int Foam::flowStatistics::debug
-(
-    Foam::debug::debugSwitch("flowStatistics", 0)
-);
-
-
 Foam::vector Foam::flowStatistics::average(const volVectorField& U)
 {
     const scalarField& V = U.mesh().V();
@@ -231,10 +225,6 @@ Foam::flowStatistics::flowStatistics
     if (!dissipation)
     {
         return;
-    }
-    if (debug)
-    {
-        Info<< "flowStatistics: dissipation" << endl;
     }
     epsilonGradient = nu*totalMagSqrGrad(U)/volume;
     epsilonLaplacian = nu*totalDissipation(U, mean)/volume;
