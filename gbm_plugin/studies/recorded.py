@@ -303,6 +303,11 @@ def finished_runs(
             yield run
 
 
+def same_flow(one: dict, other: dict) -> bool:
+    """Whether two runs, by their `summary`, are of one flow: their scales are alike, whatever solved it."""
+    return one["viscosity"] == other["viscosity"] and 0.6 < one["dissipation"] / other["dissipation"] < 1.6
+
+
 def flow_lines(runs: Sequence[dict]) -> list[str]:
     """The flows of the `summary` of each run, as text."""
     return [

@@ -24,7 +24,7 @@ from ...report.style import COLOURS, LINES, new_figure
 from ...statistics.densities import density, mean_pairwise, own_noise, quantiles, wasserstein
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import mean_curvature
-from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines, same_flow
 from ..study import compact, steps
 
 BENT = 3.0  # L/l_p from which fibers buckle
@@ -70,7 +70,7 @@ def run(
     samples, flows = [], []
     for finished in finished_runs(cases, since, records, families):
         flows.append(finished.summary())
-        flow = next(i for i, earlier in enumerate(flows) if _same_flow(earlier, flows[-1]))
+        flow = next(i for i, earlier in enumerate(flows) if same_flow(earlier, flows[-1]))
         for family in steps(finished.families, len(finished.families), finished.label):
             if family.beads > 2:
                 (values,) = finished.measure(family, lambda x, a=family.radius: mean_curvature(x, a))
@@ -83,11 +83,6 @@ def run(
         "collapse": _collapse([s for s in samples if s.collapses]),
         "densities": [_density(s) for s in samples if s.collapses],
     }
-
-
-def _same_flow(one: dict, other: dict) -> bool:
-    """Whether two runs are of one flow: their scales are alike, whatever solved it."""
-    return one["viscosity"] == other["viscosity"] and 0.6 < one["dissipation"] / other["dissipation"] < 1.6
 
 
 def _row(sample: Sample) -> dict:

@@ -29,7 +29,7 @@ from ...statistics.wormlike import (
     persistence_lengths,
     squared_ratio,
 )
-from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines
+from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines, same_flow
 from ..study import steps
 
 PAPER, EXPERIMENT = 3.0, 2.0
@@ -92,7 +92,39 @@ def run(
         "fits": fits,
         "transition": _transition(measured),
         "trend": _trend(measured),
+        "twice": _twice(flows, measured),
     }
+
+
+def _twice(flows: list[dict], measured: list[dict]) -> list[dict]:
+    """Families that two runs of one flow have, by their name, length and stiffness: what two engines make of one
+    fiber, and by how many standard errors they differ."""
+    found = []
+    for place, one in enumerate(flows):
+        for other in flows[place + 1 :]:
+            if not same_flow(one, other):
+                continue
+            second = {_fiber(r): r for r in measured if r["run"] == other["run"]}
+            for r in measured:
+                if r["run"] != one["run"] or _fiber(r) not in second or not r["fitted"]:
+                    continue
+                s = second[_fiber(r)]
+                error = float(np.hypot(r["standard_error"], s["standard_error"]))
+                off = s["R2_over_contour2"] - r["R2_over_contour2"]
+                found.append(
+                    {
+                        "of": f"{other['run']} and {one['run']}",
+                        "family": r["family"],
+                        "difference": off,
+                        "its_error": error,
+                        "errors": off / error if error else None,
+                    }
+                )
+    return found
+
+
+def _fiber(row: dict) -> tuple:
+    return row["family"], row["beads"], f"{row['length_2aN']:.6g}", row["bending_stiffness"]
 
 
 def _transition(measured: list[dict]) -> dict | None:
@@ -251,7 +283,14 @@ def rows(result: dict) -> list[dict]:
     trend = [{"run": "trend"} | result["trend"]] if result["trend"] else []
     own = result["transition"]
     transition = [{"run": "transition"} | {k: v for k, v in own.items() if k != "errors"}] if own else []
-    return [*result["rows"], *({"run": "fit"} | line for line in result["fits"]), *transition, *trend]
+    fits = [{"run": "fit"} | line for line in result["fits"]]
+    return [
+        *result["rows"],
+        *fits,
+        *({"run": "twice"} | pair for pair in result["twice"]),
+        *transition,
+        *trend,
+    ]
 
 
 def table(result: dict) -> str:
@@ -273,6 +312,12 @@ def table(result: dict) -> str:
         error = "" if line["error"] is None else f"{line['error']:7.2g}"
         lines.append(
             f"{line['variant']:34} {line['gamma']:7.3f} {error:>7} {line['scatter']:10.3f} {line['points']:9d}"
+        )
+    for name in dict.fromkeys(pair["of"] for pair in result["twice"]):
+        own = np.array([p["errors"] for p in result["twice"] if p["of"] == name and p["errors"] is not None])
+        lines.append(
+            f"{name}: {len(own)} families, ⟨R²⟩/L² differs by {np.sqrt((own**2).mean()):.2f} standard errors (rms), by "
+            f"{np.abs(own).max():.1f} at most, by {own.mean():+.2f} on average"
         )
     if t := result["transition"]:
         e = t["errors"]

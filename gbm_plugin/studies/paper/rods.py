@@ -189,11 +189,12 @@ def table(result: dict) -> str:
             f"{_cell(r['tumbling_settled'], 8, 4)} {_cell(r['standard_error'], 7, 4)} "
             f"{_cell(r['tumbling_of_every_other_record'], 7, 4)}  {along}"
         )
-    if result["fields"]:
-        rods, spheres = (np.array([f[n] for f in result["fields"]]) for n in ("rods", "spheres"))
+    for name in dict.fromkeys(f["run"] for f in result["fields"]):
+        own = [f for f in result["fields"] if f["run"] == name]
+        rods, spheres = (float(np.mean([f[n] for f in own])) for n in ("rods", "spheres"))
         lines.append(
-            f"random rods in {len(rods)} stored fields: {rods.mean():.4f} (theory 4/15 = 0.2667), spheres "
-            f"{spheres.mean():.4f} (1/6 = 0.1667)"
+            f"{name}: random rods in {len(own)} stored fields {rods:.4f} (theory 4/15 = 0.2667), spheres {spheres:.4f} "
+            "(1/6 = 0.1667)"
         )
     if result["slope"]:
         s = result["slope"]

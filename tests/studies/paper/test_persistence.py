@@ -89,6 +89,9 @@ def test_several_runs_from_the_command_line(case, tmp_path, monkeypatch, capsys)
     assert main([*argv, "--save", "found"]) == 0
     assert (tmp_path / "found.png").read_bytes().startswith(b"\x89PNG")
     result = json.loads((tmp_path / "found.json").read_text(), parse_constant=pytest.fail)
+    assert (
+        len(result["twice"]) == 3 and abs(result["twice"][0]["errors"]) < 1
+    )  # the same records, but for the first
     assert [r["from"] for r in result["runs"]] == [5, 0]
     assert {r["run"] for r in result["rows"]} == {"wlc", "wlc (2)"} and len(result["rows"]) == 6
     with (tmp_path / "found.csv").open() as file:
