@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from ...case.beads import bead_error
+from ...report.style import COLOURS, LINES
 from ...statistics.fibers import mean_curvature
 from .flows import Carrier, cellular, turbulent
 from .march import Outcome, march
@@ -63,6 +64,20 @@ def _errors(outcome: Outcome, exact: Outcome, length: float) -> dict[str, float]
         "curvature_error": float(abs(bends[0] / bends[1] - 1)),
         "bend_error": float(abs(whole[0] / whole[1] - 1)),
     }
+
+
+def draw(axes, rows: list[dict]) -> None:
+    """Error of the ends against N."""
+    for line, flow in zip(LINES, dict.fromkeys(r["flow"] for r in rows), strict=False):
+        for colour, persistence in zip(COLOURS, dict.fromkeys(r["persistence"] for r in rows), strict=False):
+            own = [r for r in rows if (r["flow"], r["persistence"]) == (flow, persistence)]
+            label = f"l$_p$/L = {persistence:g}" if line == "-" else None
+            x, y = ([r[name] for r in own] for name in ("beads", "error"))
+            axes.loglog(x, y, "o", markersize=3, linestyle=line, color=colour, label=label)
+            if line == "-":
+                axes.loglog(x, [r["rule"] for r in own], ":", color=colour, linewidth=1)
+    axes.set(title="beads (dotted: the rule)", xlabel="N", ylabel="error of the ends / L")
+    axes.legend(fontsize=7)
 
 
 def lines(rows: list[dict]) -> list[str]:

@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext
 from itertools import product
 
 from ...fiber import ab3
+from ...report.style import COLOURS
 from .flows import Carrier, cellular, turbulent
 from .front import mark_front
 from .march import best, march
@@ -85,6 +86,26 @@ def _regime(carrier: Carrier, mobility: str, regime: str, steps, end: float, mos
         row |= {"microseconds": 1e6 * outcome.seconds / (count * beads * end)} | outcome.errors(exact)
         rows.append(row | {"default": (name, tolerance) == DEFAULT})
     return rows
+
+
+def draw(axes, rows: list[dict]) -> None:
+    """Error of the ends against time in free drain at the first step, of all regimes; the default is framed."""
+    shown = [r for r in rows if r["mobility"] == "freeDrain" and r["step"] == rows[0]["step"]]
+    names = list(dict.fromkeys(r["integrator"] for r in shown))
+    flow = shown[-1]["flow"]
+    for marker, regime in zip("osD", REGIMES, strict=False):
+        for colour, name in zip(COLOURS, names, strict=False):
+            own = [r for r in shown if (r["flow"], r["regime"], r["integrator"]) == (flow, regime, name)]
+            x, y = ([r[key] for r in own] for key in ("microseconds", "error"))
+            axes.loglog(x, y, marker, linestyle="-", markersize=4, linewidth=0.8, color=colour)
+            for r in own:
+                if r["default"]:
+                    axes.plot(r["microseconds"], r["error"], "ks", markersize=9, fillstyle="none")
+        axes.plot([], [], marker, color="0.4", linestyle="", label=regime)
+    for colour, name in zip(COLOURS, names, strict=False):
+        axes.plot([], [], color=colour, label=name)
+    axes.set(title=f"integrators, {flow}", xlabel="µs a bead and τ", ylabel="error of the ends / L")
+    axes.legend(fontsize=7)
 
 
 def lines(rows: list[dict]) -> list[str]:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from itertools import product
 
+from ...report.style import COLOURS, LINES
+from ...scales import EXTRAPOLATION, coupling_error
 from .flows import cellular, turbulent
 from .march import march
 
@@ -31,6 +33,19 @@ def measure(quick: bool) -> list[dict]:
             row = {"flow": carrier.name, "regime": regime, "step": step} | outcome.errors(exact)
             rows.append(row | {"share": row["error"] / END / step**3})
     return rows
+
+
+def draw(axes, rows: list[dict]) -> None:
+    """Error of the ends against the step."""
+    for line, flow in zip(LINES, dict.fromkeys(r["flow"] for r in rows), strict=False):
+        for colour, regime in zip(COLOURS, REGIMES, strict=False):
+            own = [r for r in rows if (r["flow"], r["regime"]) == (flow, regime)]
+            x, y = ([r[name] for r in own] for name in ("step", "error"))
+            axes.loglog(x, y, "o", markersize=3, linestyle=line, color=colour, label=f"{regime}, {flow}")
+    rule = [END * coupling_error(step, 1.0) for step in STEPS]
+    axes.loglog(STEPS, rule, ":k", label=f"{EXTRAPOLATION:g} (Δt/τ)³ a τ")
+    axes.set(title="one sample a step", xlabel="Δt/τ", ylabel=f"error of the ends / L after {END:g} τ")
+    axes.legend(fontsize=7)
 
 
 def lines(rows: list[dict]) -> list[str]:

@@ -11,10 +11,14 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...report.style import new_figure
 from ...threads import limited_to
 from ..study import option, steps
 
-PARTS = ("integrators", "beads", "mobility", "step")
+PARTS = ("integrators", "beads", "mobility", "sampling", "step")
 
 
 def _part(name: str) -> ModuleType:
@@ -35,6 +39,19 @@ def run(only: Sequence[str] = PARTS, quick: bool = False) -> dict:
 def rows(result: dict) -> list[dict]:
     """The lines of a CSV file, of all parts."""
     return [{"part": name} | row for name, found in result.items() for row in found]
+
+
+def draw(result: dict) -> Figure:
+    """A panel for each part that has a picture."""
+    drawn = [name for name in result if hasattr(_part(name), "draw")]
+    columns = min(2, len(drawn))
+    figure = new_figure(5.2 * columns, 4.2 * -(-len(drawn) // columns))
+    panels = np.ravel(figure.subplots(-(-len(drawn) // columns), columns, squeeze=False))
+    for axes, name in zip(panels, drawn, strict=False):
+        _part(name).draw(axes, result[name])
+    for axes in panels[len(drawn) :]:
+        axes.set_axis_off()
+    return figure
 
 
 def table(result: dict) -> str:
