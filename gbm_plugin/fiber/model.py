@@ -87,7 +87,9 @@ class MotionOptions(_Options):
 
 @dataclass(frozen=True)
 class Model(FiberOptions, MotionOptions):
-    """The whole choice, as a case makes it."""
+    """The whole choice, as a case makes it; it leaves the integrator to each family's stiffness (docs/accuracy.md)."""
+
+    integrator: str = field(default="auto", metadata={"allowed": INTEGRATORS})
 
     def _check_together(self) -> None:
         super()._check_together()

@@ -41,7 +41,8 @@ class Stepper:
     refused.
     tolerance (for implicit and auto; None: 1e-3): bead displacement over fiber length. Every accepted step of
     every fiber is held to a tenth of it, in the rms rotation of its links, so that a relaxation of several
-    steps stays within. repulsion: below about 1/time_step.
+    steps stays within; those of ab3 in auto to all of it, for they are of third order and the estimate of second.
+    repulsion: below about 1/time_step.
 
     need says what observe() takes beside the velocity. The loop of a run:
 
@@ -294,7 +295,7 @@ class Stepper:
         everyone = np.arange(self.fibers.count)
         if count <= AFFORDABLE:
             error = self._explicit(count)
-            self._implicit(everyone[~(error <= self.local_tolerance)])
+            self._implicit(everyone[~(error <= self.tolerance)])
         else:
             self._ages = []
             self._implicit(everyone)
@@ -334,7 +335,7 @@ class Stepper:
         self._tension = tension.reshape(-1)[: fibers.count].max()
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
-        self._count(count, error if self.integrator == "ab3" else error[error <= self.local_tolerance])
+        self._count(count, error if self.integrator == "ab3" else error[:0])
         self._counts["ab3_steps"] += 1
         return error
 

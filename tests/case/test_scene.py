@@ -37,7 +37,7 @@ def test_defaults(case):
     assert (scene.density, scene.record_interval, scene.interpolation) == (1.0, 10, "trilinear")
     family = scene.families[0]
     assert family.model == Model(
-        integrator="ab3", mobility="freeDrain", bending_torque="consistent", curvature_law="sine"
+        integrator="auto", mobility="freeDrain", bending_torque="consistent", curvature_law="sine"
     )
     assert (family.seed, family.shape, family.positions) == (1, "straight", None)
     assert family.bending_stiffness == 0 and family.radius == pytest.approx(0.1)

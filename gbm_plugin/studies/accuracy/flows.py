@@ -50,9 +50,9 @@ def cellular() -> Carrier:
 def turbulent(cells: int = 40, last: float = 5.0, every: float = 0.1) -> Carrier:
     """A recorded history of the default case's turbulence (ν = 0.01, P = 0.05 in a box of 2π), at Re_λ = 24 on 40³
     nodes, of `last` Kolmogorov times from when it is developed, a field every so many; quintic in space."""
-    solver = SpectralSolver(cells, 0.01, BOX, LinearForcing(power=0.05), time_step=0.02)
+    solver = SpectralSolver(cells, 0.01, BOX, LinearForcing(power=0.05), time_step=0.015)
     solver.set_velocity(large_scales(cells))
-    solver.advance(300)
+    solver.advance(400)
     tau = float(solver.statistics()["kolmogorov_time"])
     steps = max(1, round(every * tau / solver.time_step))
     fields = [solver.velocity]
