@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,7 @@ QUANTITIES = {
     "flatness of ∂u/∂x": ("velocity_flatness", "", ""),
 }
 FLOWS = {"I": 0.0015, "II": 0.34}  # ε
+TURNOVERS = 3.0  # L/u' without which no series has an error: the swing of less looks like a trend
 OF_FIELDS = ("integral_length", "velocity_skewness", "velocity_flatness")
 
 
@@ -128,8 +130,13 @@ def _summary(name, cells, times, columns, spectrum, fields, box=2 * np.pi) -> di
     """Means with errors of the columns, which are equidistant in time each."""
     means = {q: fiber_average(values[:, None]) for q, values in columns.items()}
     epsilon, spacing = means["ε"], float(np.diff(times).mean())
-    correlation = None if epsilon.correlation_time is None else epsilon.correlation_time * spacing
     duration = float(times[-1] - times[0]) + spacing
+    length = means.get("L = (π/2u'²)∫E/k dk", means["u'³/ε"]).value
+    turnovers = duration * means["u'"].value / length
+    if turnovers < TURNOVERS:
+        means = {q: replace(m, error=None, correlation_time=None) for q, m in means.items()}
+        epsilon = means["ε"]
+    correlation = None if epsilon.correlation_time is None else epsilon.correlation_time * spacing
     thin = slice(None, None, max(1, len(times) // 2000))
     return {
         "name": name,
@@ -140,9 +147,7 @@ def _summary(name, cells, times, columns, spectrum, fields, box=2 * np.pi) -> di
             q: {"mean": m.value, "standard_error": m.error, "text": _text(m)} for q, m in means.items()
         },
         "duration": duration,
-        "turnovers": duration * means["u'"].value / means["L = (π/2u'²)∫E/k dk"].value
-        if "L = (π/2u'²)∫E/k dk" in means
-        else None,
+        "turnovers": turnovers,
         "correlation_times": correlation and duration / correlation,
         "fields": fields,
         "k_max_eta": (cells - 1) // 3 * 2 * np.pi / box * means["η"].value,
@@ -152,7 +157,7 @@ def _summary(name, cells, times, columns, spectrum, fields, box=2 * np.pi) -> di
 
 
 def _text(mean: Estimate) -> str:
-    return str(mean) if mean.error else f"{mean.value:.4g} (too short for an error)"
+    return str(mean) if mean.error else f"{mean.value:.4g} (too short)"
 
 
 def rows(result: dict) -> list[dict]:
@@ -179,11 +184,9 @@ def table(result: dict) -> str:
 
 
 def _column(r: dict) -> list[str]:
-    span = f"{r['duration']:.4g}"
-    if r["turnovers"]:
-        span += f" = {r['turnovers']:.3g} L/u'"
+    span = f"{r['duration']:.4g} = {r['turnovers']:.3g} L/u'"
     if r["correlation_times"]:
-        span += f" = {r['correlation_times']:.2g} integral times of ε"
+        span += f" = {r['correlation_times']:.0f} integral times of ε"
     box = "" if abs(r["box"] - 2 * np.pi) < 1e-6 else f", box {r['box']:g}"
     means = [r["means"].get(q, {}).get("text", "") for q in QUANTITIES]
     return [f"{r['cells']}³{box}", *means, span, str(r["fields"]), f"{r['k_max_eta']:.2f}"]

@@ -36,6 +36,7 @@ def test_means_are_those_of_the_run(case):
     assert means["Re_λ"] == pytest.approx(reynolds.mean())
     assert found["cells"] == 16 and found["fields"] == 4 and found["name"] == "case/spectral"
     assert found["duration"] == pytest.approx(0.62)
+    assert found["turnovers"] < 3 and all(m["standard_error"] is None for m in found["means"].values())
 
     solver = SpectralSolver(16, NU, forcing=EswaranPope(time_scale=0.5, **FORCE), time_step=0.02)
     own = []
