@@ -316,3 +316,12 @@ def flow_lines(runs: Sequence[dict]) -> list[str]:
         + f", η = {r['kolmogorov_length']:.4g}, τ = {r['kolmogorov_time']:.4g}, Re_λ = {r['taylor_reynolds']:.1f}"
         for r in runs
     ]
+
+
+def checked_bending(measured: Sequence, cases: Sequence[Path]) -> Sequence:
+    """What was measured of the families of three beads or more; ValueError where there is none."""
+    if not measured:
+        raise ValueError(
+            f"no family has more than two beads, of which nothing bends: {' '.join(map(str, cases))}"
+        )
+    return measured

@@ -24,7 +24,7 @@ from ...report.style import COLOURS, LINES, new_figure
 from ...statistics.densities import density, mean_pairwise, own_noise, quantiles, wasserstein
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import mean_curvature
-from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines, same_flow
+from ..recorded import Family, Since, add_run_arguments, checked_bending, finished_runs, flow_lines, same_flow
 from ..study import compact, steps
 
 BENT = 3.0  # L/l_p from which fibers buckle
@@ -77,7 +77,7 @@ def run(
                 samples.append(Sample(family, values, flow))
     return {
         "runs": flows,
-        "rows": [_row(s) for s in samples],
+        "rows": [_row(s) for s in checked_bending(samples, cases)],
         "beads": _compared(samples, lambda s: (s.fiber, s.method), "beads"),
         "method": _compared(samples, lambda s: (s.fiber, s.family.beads), "method"),
         "collapse": _collapse([s for s in samples if s.collapses]),

@@ -21,7 +21,15 @@ from ...report.style import COLOURS, new_figure
 from ...statistics.densities import density, distance_to
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import end_to_end, gyration_radius
-from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
+from ..recorded import (
+    Family,
+    FinishedRun,
+    Since,
+    add_run_arguments,
+    checked_bending,
+    finished_runs,
+    flow_lines,
+)
 from ..study import compact, steps
 
 BINS = 40
@@ -48,6 +56,7 @@ def run(
                 row = _row(finished, family, vectors / family.contour, gyration / family.contour)
                 measured.append(row)
                 densities.append(_densities(family, vectors / family.contour, gyration / family.contour))
+    checked_bending(measured, cases)
     return {"runs": flows, "rows": measured, "slopes": _slopes(measured), "densities": densities}
 
 

@@ -42,6 +42,7 @@ QUANTITIES = {
     "skewness of ∂u/∂x": ("velocity_skewness", "", ""),
     "flatness of ∂u/∂x": ("velocity_flatness", "", ""),
 }
+SETTLED = (150.0, 20.0)  # the start of the averages of KEPT [s]
 FLOWS = {"I": 0.0015, "II": 0.34}  # ε
 TURNOVERS = 3.0  # L/u' without which no series has an error: the swing of less looks like a trend
 OF_FIELDS = ("integral_length", "velocity_skewness", "velocity_flatness")
@@ -50,17 +51,19 @@ OF_FIELDS = ("integral_length", "velocity_skewness", "velocity_flatness")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "folders of runs, or CSV files of gbm study flow-one (default: the kept ones of Flow I)"
     parser.add_argument("runs", nargs="*", type=Path, default=KEPT, metavar="RUN", help=text)
-    option(parser, run, "settle", "start of the averages of each run [s]")
+    option(parser, run, "settle", "start of the averages of each run [s]", nargs="+", type=float)
     option(parser, run, "states", "stored fields to take of each folder, at most")
 
 
-def run(runs: Sequence[Path] = KEPT, settle: tuple[float, ...] = (150.0, 20.0), states: int = 24) -> dict:
+def run(runs: Sequence[Path] = KEPT, settle: Sequence[float] = (), states: int = 24) -> dict:
     """Means with standard errors of every run. FileNotFoundError where there is none, ValueError where the starts of
-    the averages are not one for each run."""
+    the averages are not one for each run; those of the kept runs are known."""
+    if tuple(runs) == tuple(KEPT):
+        settle = settle or SETTLED
     if len(settle) != len(runs):
-        found = " ".join(p.name for p in runs)
+        found = " ".join(Path(p).name for p in runs)
         raise ValueError(
-            f"--settle has {len(settle)} numbers for {len(runs)} runs, {found}: give one for each"
+            f"--settle has {len(settle)} numbers for {len(runs)} runs, {found}: give the start of the averages of each"
         )
     found = []
     for path, start in zip(runs, settle, strict=True):

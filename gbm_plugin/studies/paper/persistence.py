@@ -38,6 +38,7 @@ BENT = 5.0  # L/l_p from which a family is bent for sure
 # L/l_p at which a free-draining fiber begins to buckle under compression at the rms longitudinal rate (ε/15ν)^(1/2):
 # 3πμSL⁴/K^b = 123.5 (docs/results/buckling.md), l_p⁴ = K^b (ν/ε)^(1/2)/μ
 BUCKLING = (123.5 * 15**0.5 / (3 * np.pi)) ** 0.25
+NOT_BENT = 1 - 1e-9  # <R²>/L² from which rounding alone may differ from 1
 LEAST = 1.0  # L/l_p of a family that can tell γ: below, it is a rod
 
 
@@ -176,9 +177,9 @@ def _trend(measured: list[dict]) -> dict | None:
 def _row(point: Point) -> dict:
     family, ratio = point.family, point.ratio
     own = error = None
-    if ratio < 1 and 0 < family.stretch < np.inf:
+    if ratio < NOT_BENT and 0 < family.stretch < np.inf:
         own = family.stretch / persistence_lengths(ratio)
-        above, below = (persistence_lengths(min(ratio + s * point.error, 1 - 1e-9)) for s in (0.5, -0.5))
+        above, below = (persistence_lengths(min(ratio + s * point.error, NOT_BENT)) for s in (0.5, -0.5))
         error = abs(family.stretch / above - family.stretch / below) if point.error else None
     return family.row() | {
         "R2_over_contour2": ratio,

@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 from ...report.style import new_figure
 from ...statistics.fibers import end_to_end
 from ...statistics.orientation import anisotropy
-from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
+from ..recorded import (
+    Family,
+    FinishedRun,
+    Since,
+    add_run_arguments,
+    checked_bending,
+    finished_runs,
+    flow_lines,
+)
 from ..study import steps
 
 WITHIN = (0.25, 0.5, 0.75, 1.0)  # of each link, the places that count
@@ -46,14 +54,11 @@ def run(
                 (vectors,) = finished.measure(family, end_to_end)
                 own.append(_row(family, vectors))
         measured += own
-        chosen = [r for r in own if r["resolved"]] or own
-        chosen = [
-            max(chosen, key=lambda r: r["R2_over_contour2"]),
-            min(chosen, key=lambda r: r["R2_over_contour2"]),
-        ]
-        for row in chosen if not pictures else ():
+        chosen = sorted([r for r in own if r["resolved"]] or own, key=lambda r: -r["R2_over_contour2"])
+        for row in (chosen[:1] + chosen[-1:]) if not pictures else ():
             family = next(f for f in finished.families if f.name == row["family"])
             pictures.append(row | {"density": _density(finished, family).round(4).tolist()})
+    checked_bending(measured, cases)
     return {"runs": flows, "rows": measured, "pictures": pictures}
 
 

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pytest
 
 from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
@@ -37,3 +38,31 @@ def test_page_of_a_run(tmp_path, capsys):
     )  # fibers, energy, end_to_end
     assert "rods: no family is straight" in page and 'src="http' not in page
     assert "index.html" in capsys.readouterr().out
+
+
+ODD = {
+    "two beads, straight to rounding": (4, 2, 1e-5),
+    "one fiber without stiffness": (1, 6, 0.0),
+    "one fiber, nearly rigid": (1, 6, 1e9),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("odd", ODD)
+def test_an_odd_run_is_measured_or_refused_in_one_line(odd, tmp_path, capsys):
+    count, beads, stiffness = ODD[odd]
+
+    def moving(time):
+        p = unit(np.random.default_rng(round(100 * time)).normal(size=(count, 3)))
+        return rods(p, beads, 0.1)
+
+    record = FamilyRecord("odd", count, beads, 0.1, stiffness)
+    case = record_run(tmp_path / "odd", [(record, moving)], 0.1 * np.arange(12))
+    for name in NAMES:
+        done = main(["study", name, str(case)])
+        said = capsys.readouterr()
+        assert (done == 0) == (not said.err), name
+        assert "nan" not in said.out and len(said.err.splitlines()) <= 1, name
+        assert done == 0 or re.search(
+            "more than two beads|no statistics.h5|no family is straight", said.err
+        ), name
