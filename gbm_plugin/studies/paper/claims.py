@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...scales import kolmogorov_length
-from ...statistics.wormlike import squared_ratio
+from ...statistics.wormlike import Transition, squared_ratio
 from ..study import option
 
 FILES = ("persistence", "curvature", "end-to-end", "shapes", "dynamics")
@@ -63,13 +63,16 @@ def _steps(curvature: dict) -> Iterator[dict]:
         f"Δt may be {6 / 11 / 0.206:.1f} (or {6 / 11 / 0.412:.1f}) times that",
         "yes, it is safe",
     )
-    own = [r for r in curvature["method"] if r["distance"] > 0]
-    own = [r for r in own if r["against"].startswith(r["run"] + " ")] or own
-    if own:
+    groups: dict[str, list[dict]] = {}
+    for r in curvature["method"]:
+        groups.setdefault(r["against"], []).append(r)
+    several = [g for g in groups.values() if len({r["integrator"] for r in g}) > 1]
+    if several:
+        own = [r for r in max(several, key=len) if r["distance"] > 0]
         text = "; ".join(
-            f"{r['family']} ({r['integrator']}, Δt = {r['time_step']:g}) is {r['distance']:.3f} of the mean curvature "
-            f"from {r['against']}, {r['by_chance']:.3f} by chance"
-            for r in own[:3]
+            f"{r['run']} {r['family']} ({r['integrator']}, Δt = {r['time_step']:g}) is {r['distance']:.3f} of the mean "
+            f"curvature from {r['against']}, {r['by_chance']:.3f} by chance"
+            for r in own
         )
         needed = any(r["distance"] > DIFFERENT * r["by_chance"] for r in own)
         yield _verdict(
@@ -225,17 +228,18 @@ def _gamma(persistence: dict, flows: dict[str, list[dict]]) -> Iterator[dict]:
     runs = {
         f: [fits[f"run {r['run']}"] for r in own if f"run {r['run']}" in fits] for f, own in flows.items()
     }
-    if runs["I"] and runs["II"]:
-        text = "; ".join(
+    if runs["I"] and runs["II"] and persistence["transition"]:
+        text = "γ in " + "; ".join(
             f"Flow {flow}: "
             + ", ".join(f"{f['gamma']:.2f} ± {f['error']:.2f} ({f['variant'][4:]})" for f in own)
             for flow, own in runs.items()
         )
-        one, two = runs["I"][0], runs["II"][0]
-        same = abs(one["gamma"] - two["gamma"]) < 2 * np.hypot(one["error"], two["error"])
-        yield _verdict(
-            "γ is the same in both flows: less stiffness is as good as more turbulence", text, same
-        )
+        text += f"; {_around_one_curve(persistence, flows)}"
+        one, two = (_offsets(persistence, flows[f]) for f in ("I", "II"))
+        error = np.hypot(one.std() / len(one) ** 0.5, two.std() / len(two) ** 0.5)
+        apart = abs(one.mean() - two.mean())
+        same = True if apart < 2 * error else f"to {apart:.0%}"
+        yield _verdict("both flows have one curve: less stiffness is as good as more turbulence", text, same)
     own = [r for r in persistence["rows"] if r["fitted"]]
     straight, bent = (f(own, key=lambda r: r["L_over_l_p"]) for f in (min, max))
     yield _verdict(
@@ -260,6 +264,22 @@ def _gamma(persistence: dict, flows: dict[str, list[dict]]) -> Iterator[dict]:
         "two numbers of one name: axes here say L/l_p",
         False,
     )
+
+
+def _offsets(persistence: dict, runs: list[dict]) -> np.ndarray:
+    """ln ⟨R²⟩/L² of the families of some runs from the one curve through all."""
+    t, names = persistence["transition"], [r["run"] for r in runs]
+    curve = Transition(t["plateau"], t["middle"], t["steepness"], tuple(t["errors"]), t["scatter"])
+    own = [r for r in persistence["rows"] if r["fitted"] and r["run"] in names]
+    return np.array([np.log(r["R2_over_contour2"] / float(curve(r["L_over_l_p"]))) for r in own])
+
+
+def _around_one_curve(persistence: dict, flows: dict[str, list[dict]]) -> str:
+    parts = []
+    for flow, runs in flows.items():
+        own = _offsets(persistence, runs)
+        parts.append(f"Flow {flow} by {own.mean():+.1%} ± {own.std() / len(own) ** 0.5:.1%}")
+    return f"around one curve of L/l_p ⟨R²⟩ lies off, {', '.join(parts)}"
 
 
 def _contact(dynamics: dict) -> Iterator[dict]:
