@@ -16,6 +16,7 @@ from .verdict import WRONG, verdicts
 
 LIBRARY = "gbmPlugin"
 WITHOUT_OPTIONS = ("icoFoam", "dnsFoam")  # solvers that never look at fvOptions
+FEEDBACK_WORDS = ("trilinear", "cubic", "quintic")  # interpolations whose transpose spreads forces
 STEADY = ("simpleFoam", "porousSimpleFoam", "SRFSimpleFoam", "potentialFoam")
 WORDS = {  # what the plugin brings, by the dictionary that names it
     "constant/turbulenceProperties": ("constantViscosity",),
@@ -40,8 +41,25 @@ def check_openfoam(scene: Scene) -> None:
             f"is {scene.application}, which does not look at fvOptions: the forcing {scene.forcing.name} would do "
             "nothing; pimpleFoam, pisoFoam and boxFoam do",
         )
+    if scene.coupling.feedback:
+        _check_feedback(scene, control)
     _check_functions(control)
     _check_libraries(scene, control)
+
+
+def _check_feedback(scene: Scene, control: Dictionary) -> None:
+    """What OpenFOAM would find out at its first step."""
+    if scene.application in WITHOUT_OPTIONS:
+        raise control.fail(
+            "application",
+            f"is {scene.application}, which does not look at fvOptions: the fibers' feedback would do nothing; "
+            "pimpleFoam, pisoFoam and boxFoam do",
+        )
+    if scene.interpolation not in FEEDBACK_WORDS:
+        raise CaseError(
+            f"{scene.case}/constant/fiberProperties: interpolation is {scene.interpolation}, whose weights OpenFOAM "
+            f"does not tell: with feedback allowed are {' '.join(FEEDBACK_WORDS)}"
+        )
 
 
 def _check_functions(control: Dictionary) -> None:

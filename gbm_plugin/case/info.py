@@ -10,6 +10,7 @@ from . import plan
 from .cost import cost
 from .disk import needed, readable
 from .expected import Expected, expected
+from .feedback import reaction
 from .scene import Family, Scene
 from .verdict import GOOD, Verdict, persistence_length, step_limit, sub_steps, verdicts
 
@@ -75,6 +76,8 @@ def _family(f: Family, scene: Scene, flow: Expected) -> dict:
         "time_step_limit": step_limit(f, scene),
         "sub_steps": sub_steps(f, scene),
     }
+    if scene.coupling.feedback and scene.box is not None:
+        result |= reaction(f, scene)
     if flow.dissipation:
         size = diameter / flow.kolmogorov_length
         persistence = persistence_length(f, scene, flow.dissipation)

@@ -39,6 +39,8 @@ def computed(scene: Scene) -> list[Item]:
             f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in scene.forcing.values.items()
         )
         items.append(Item("forcing", f"{scene.forcing.type} {values}", "fvOptions"))
+    if scene.coupling.feedback:
+        items.append(Item("feedback", "forces and torques of the beads on the flow", "coupling: feedback"))
     items += [_family(f, scene, chosen) for f in scene.families]
     wanted = need(scene)
     if wanted == "gradient":
@@ -68,7 +70,7 @@ def left_out(scene: Scene) -> list[str]:
 def exchanged(scene: Scene) -> Item:
     """Bytes of a step between solver and daemons."""
     beads = sum(f.count * f.beads for f in scene.families)
-    out, back = 24 * beads, 8 * SAMPLE[need(scene)] * beads
+    out, back = (72 if scene.coupling.feedback else 24) * beads, 8 * SAMPLE[need(scene)] * beads
     daemons = f"{scene.coupling.daemons} daemons" if scene.coupling.daemons > 1 else "1 daemon"
     how = f"{readable(out)} out, {readable(back)} back a step, {daemons}"
     return Item("exchanges", how, f"{scene.coupling.transport}, {beads} beads")

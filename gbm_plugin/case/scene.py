@@ -14,6 +14,7 @@ from ..errors import CaseError
 from ..fiber.model import Model, ModelError, entry_name
 from .beads import Fluid, read_beads
 from .dictionary import Dictionary
+from .feedback import check_feedback
 from .mesh import Box, read_box
 from .positions import read_positions
 from .share import Share
@@ -23,6 +24,7 @@ TRANSPORTS = ("socket", "tcp", "file")
 START_FROM = ("latestTime", "startTime", "firstTime")
 SHAPES = ("straight", "file")
 RECORD = ("tension",)  # what a recording may have beside the positions
+OWN_DISTURBANCE = ("auto", "kept", "removed")
 
 LABEL_MAX = 2**31 - 1  # of the 32 bits that OpenFOAM's labels have at least
 
@@ -90,6 +92,7 @@ class Coupling:
     port: int = 0
     daemons: int = 1  # that share the fibers
     feedback: bool = False  # whether fibers act on the flow
+    own_disturbance: str = "auto"  # of beads in the flow that they sample, with feedback
 
 
 @dataclass(frozen=True)
@@ -188,6 +191,7 @@ def read_scene(case: Path | str) -> Scene:
     )
     fibers.done()
     _check_memory(scene)
+    check_feedback(scene)
     for family in scene.families:
         if family.model.repulsion * time_step > 1:
             raise CaseError(
@@ -317,7 +321,10 @@ def _read_coupling(fibers: Dictionary) -> Coupling:
         port=d.integer("port", 0, least=0),
         daemons=d.integer("daemons", 1, least=1),
         feedback=d.switch("feedback", False),
+        own_disturbance=d.word("ownDisturbance", OWN_DISTURBANCE, "auto"),
     )
+    if not coupling.feedback and coupling.own_disturbance != "auto":
+        raise d.fail("ownDisturbance", "goes with feedback yes: without it beads disturb nothing")
     if coupling.port and coupling.daemons > 1:
         raise d.fail(
             "port", f"is one for {coupling.daemons} daemons; with several it must be 0, any free one"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from .beads import bead_error, enough_beads
 from .expected import Expected
+from .feedback import NEGLIGIBLE, STABLE, TOO_LARGE, cell_size, exchange_step, own_ratio, removes_own
 from .scene import Family, Scene
 from .solver import stable_courant
 
@@ -27,6 +28,8 @@ BEADS = (
 )  # 2a/l_p: on a curve of radius l_p differences between beads err by (2a/l_p)^2/12, 5 and 20 %
 # d/eta: up to a shear Reynolds number (d/2)^2/(nu tau_eta) of 1, and a Stokes number d^2/(18 eta^2) of about 1
 BEAD = (2.0, 5.0)
+EXCHANGE = (0.2, STABLE)  # with feedback, of the mean over the box: somewhere there are more beads
+DENSE = (3.0, 10.0)  # n L^3: fibers in the cube of their length; beyond some they meet
 LENGTH = (0.5, 1.0)  # L over the box: a longer fiber meets the flow of its own other end
 
 
@@ -65,6 +68,8 @@ def verdicts(scene: Scene, flow: Expected) -> list[Verdict]:
         numbers = f"{worst.name}: bead Re {size**2:.2g}, Stokes {size**2 / 18:.2g}"
         thinner = math.ceil(worst.beads * size / BEAD[0])
         found.append(_graded("d/eta", size, BEAD, numbers, f"beads {thinner}, or thinner fibers"))
+    if scene.coupling.feedback:
+        found += _of_feedback(scene)
     if scene.box:
         worst, part = _worst(scene.families, lambda f: f.length / min(scene.box))
         found.append(
@@ -111,6 +116,27 @@ def _of_the_flow(scene: Scene, flow: Expected) -> list[Verdict]:
         change = f"deltaT {_below(longest)} (controlDict)"
         asked = f"up to {FORECAST[0]:g}: one sample a step, foreseen"
         found.append(_graded("dt/tau_eta", ratio, FORECAST, asked, change))
+    return found
+
+
+def _of_feedback(scene: Scene) -> list[Verdict]:
+    """Whether beads are points to the flow, few enough for an explicit exchange, and fibers that do not touch."""
+    loading = exchange_step(scene)
+    found = [
+        _graded("exchange", loading, EXCHANGE, f"6 pi nu a n dt: stable to {STABLE:.2g}", "a shorter deltaT")
+    ]
+    if (cell := cell_size(scene)) is not None:
+        worst, ratio = _worst(scene.families, lambda f: own_ratio(f.radius, cell))
+        limits = (TOO_LARGE if removes_own(scene, worst) else NEGLIGIBLE, TOO_LARGE)
+        asked = (
+            f"{worst.name}: own disturbance of its slip, {'removed' if limits[0] > NEGLIGIBLE else 'kept'}"
+        )
+        found.append(_graded("a/dx/1.77", ratio, limits, asked, "ownDisturbance auto (fiberProperties)"))
+    if scene.box:
+        worst, dense = _worst(scene.families, lambda f: f.total / math.prod(scene.box) * f.length**3)
+        found.append(
+            _graded("n L^3", dense, DENSE, f"{worst.name}: no contact between fibers", "fewer fibers")
+        )
     return found
 
 

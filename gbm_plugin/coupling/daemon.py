@@ -29,6 +29,7 @@ from ..signals import Asked, handled
 from .channel import Channel
 from .listen import listen
 from .message import (
+    KEEP,
     PROVISIONAL,
     STOP,
     Hello,
@@ -57,11 +58,6 @@ def serve(case: Path | str, number: int | None = None) -> None:
     case = Path(case).resolve()
     scene = read_scene(case)
     check_case(case)
-    if scene.coupling.feedback:
-        raise CaseError(
-            f"{case}/constant/fiberProperties: feedback is yes, which OpenFOAM's side cannot do yet; gbm run CASE "
-            "--flow spectral can"
-        )
     share = _share(scene, number)
     scene = scene.part(share)
     stop = Asked()
@@ -166,7 +162,7 @@ class Session:
             share=self.share,
             state=find_state(self.scene.case, hello.folder),
         )
-        welcome = encode_welcome(self.fleet.need, self.fleet.sizes)
+        welcome = encode_welcome(self.fleet.need, self.scene.coupling.feedback, self.fleet.sizes)
         self.channel.send(Message(Kind.WELCOME, self.step, self.time, welcome))
         try:
             self._observe()
@@ -239,27 +235,35 @@ class Session:
         """Send the positions of this step until their sample is final; False where OpenFOAM ends instead."""
         while True:
             self._send_positions()
-            message = self._receive(Kind.SAMPLE, Kind.SAVE, Kind.END)
+            message = self._receive(Kind.SAMPLE, Kind.END)
             if message.kind is Kind.END:
                 self._check_step(message, self.step - 1, self.time - self.time_step)
                 self._goodbye(message)
                 return False
             self._check_step(message, self.step, self.time)
             try:
-                folder = None
-                if message.kind is Kind.SAVE:
-                    folder = self.scene.case / decode_folder(message.payload)
-                    message = self._receive(Kind.SAMPLE)
-                    self._check_step(message, self.step, self.time)
                 arrived_at = clock.time()
                 velocity, extra = decode_sample(message, self.fleet.beads, self.fleet.need)
             except ProtocolError as error:
                 raise self.channel.error(str(error)) from None
             if not self.journal.take(self.step, velocity, extra, self.sent_at, arrived_at):
                 continue
-            if folder is not None:
-                self.journal.save(folder, self.step, self.time)
+            if (reaction := self.journal.reaction) is not None:
+                loads = encode_array(np.stack([reaction.force, reaction.torque]))
+                self.channel.send(Message(Kind.FORCES, self.step, self.time, loads))
+            if message.flags & KEEP:
+                self._save()
             return True
+
+    def _save(self) -> None:
+        """Keep this step's state where OpenFOAM has written its fields by now."""
+        message = self._receive(Kind.SAVE)
+        self._check_step(message, self.step, self.time)
+        try:
+            folder = decode_folder(message.payload)
+        except ProtocolError as error:
+            raise self.channel.error(str(error)) from None
+        self.journal.save(self.scene.case / folder, self.step, self.time)
 
     def _check_step(self, message: Message, step: int, time: float) -> None:
         if message.step != step or abs(message.time - time) > 1e-6 * self.time_step:

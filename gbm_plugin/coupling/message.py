@@ -14,15 +14,16 @@ from ..case.share import Share
 from ..sampling import NEEDS
 
 MAGIC = b"GBMC"
-VERSION = 3
+VERSION = 4
 NONCE_SIZE = 32  # a random number that shows that a connection is no repetition [bytes]
-MAX_TEXT = 65536  # longest payload of all but POSITIONS and SAMPLE [bytes]
+MAX_TEXT = 65536  # longest payload of all but POSITIONS, SAMPLE and FORCES [bytes]
 
 _HEADER = struct.Struct("<4sHHIIqdQ")
 HEADER_SIZE = _HEADER.size
 
 PROVISIONAL = 1  # flag of POSITIONS: these will be corrected after their sample
 STOP = 2  # flag of POSITIONS: write and stop after the next step
+KEEP = 4  # flag of SAMPLE: SAVE follows, once the fields of this step are written
 
 
 class Kind(enum.IntEnum):
@@ -37,6 +38,10 @@ class Kind(enum.IntEnum):
     WAIT = 9  # fibers -> flow: one line, why WELCOME takes longer
     CHALLENGE = 10  # fibers -> flow: a random number, and who asks
     PROOF = 11  # flow -> fibers: who answers
+    FORCES = 12  # fibers -> flow: forces and torques on the flow at that sample
+
+
+FLAGS = {Kind.POSITIONS: PROVISIONAL | STOP, Kind.SAMPLE: KEEP}
 
 
 class ProtocolError(Exception):
@@ -81,7 +86,7 @@ def decode_header(data: bytes, most: int = MAX_TEXT) -> tuple[Message, int]:
         )
     if kind not in Kind.__members__.values():
         raise ProtocolError(f"message of unknown kind {kind}")
-    if flags & ~(PROVISIONAL | STOP if kind == Kind.POSITIONS else 0):
+    if flags & ~FLAGS.get(Kind(kind), 0):
         raise ProtocolError(f"{Kind(kind).name} has unknown flags: {flags}")
     if reserved:
         raise ProtocolError(f"{Kind(kind).name} has {reserved} where 0 is reserved")
@@ -145,10 +150,11 @@ def decode_folder(data: bytes | memoryview) -> str:
     return folder
 
 
-def encode_welcome(need: str, families: list[tuple[int, int, int]]) -> bytes:
-    """need: what to sample; families: fibers, beads of each, and number of the first fiber, of each family."""
+def encode_welcome(need: str, feedback: bool, families: list[tuple[int, int, int]]) -> bytes:
+    """need: what to sample; feedback: whether FORCES answer a sample; families: fibers, beads of each, and number of
+    the first fiber, of each family."""
     flat = [n for family in families for n in family]
-    return struct.pack(f"<{2 + len(flat)}q", NEEDS.index(need), len(families), *flat)
+    return struct.pack(f"<{3 + len(flat)}q", NEEDS.index(need), feedback, len(families), *flat)
 
 
 def encode_array(values: np.ndarray) -> memoryview:

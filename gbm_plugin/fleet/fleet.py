@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import check_arrays, read_arrays
+from ..case.feedback import cell_size, removes_own
 from ..case.layout import STATE_FILE, fiber_state
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
 from ..errors import CaseError, PredictionError, StateError
-from ..fiber import Fibers, Group, Stepper, merged_states, prepare
+from ..fiber import Fibers, Group, Reaction, Stepper, merged_states, prepare
 from ..fiber.state import check_state, forms
 from ..files import replaced
 from ..statistics.fibers import end_to_end_squared_ratio
+from .own import SHELLS, OwnDisturbance, kernel
 
 log = logging.getLogger(__name__)
 
@@ -33,6 +35,7 @@ HEADER = {
     "step": ("i", ()),
     "time": ("f", ()),
 }  # of a state file, beside the families
+OWN = "own_disturbance"  # of a family, in a state file
 MOST_NUMBERS = 64  # of an array for each bead: 4 samples of velocity and rotation have 24
 SMALL = 1 << 16  # arrays of so many bytes are read, whatever they are
 
@@ -51,12 +54,17 @@ class Fleet(Group):
         self.families = tuple(families)
         self.share = share
         self._step_length = 0.0
+        self._own: dict[str, OwnDisturbance] = {}  # by family, of those whose beads must not feel it
+        self._reaction: Reaction | None = None
 
     @classmethod
-    def seeded(cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE) -> Fleet:
+    def seeded(
+        cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE, cut: float = 1.0
+    ) -> Fleet:
         """New fibers, at random places and orientations in the box unless the case gives their positions.
 
-        share: whose part of the families the scene has; their fibers are those that they are in the whole.
+        share: whose part of the families the scene has; their fibers are those that they are in the whole. cut: largest
+        wavenumber that the flow resolves, over π/Δx.
         """
         size = np.subtract(box_max, box_min)
         steppers = []
@@ -73,15 +81,44 @@ class Fleet(Group):
             except ValueError as error:
                 raise CaseError(f"family {f.name} in constant/fiberProperties: {error}") from None
             steppers.append(Stepper(fibers, time, **f.model.motion))
-        return cls(scene.families, steppers, share)
+        fleet = cls(scene.families, steppers, share)
+        for f in scene.families:
+            if removes_own(scene, f):
+                where = (scene.interpolation, cell_size(scene), float(np.prod(size)) ** (1 / 3))
+                fluid = (scene.kinematic_viscosity, scene.density)
+                fleet._own[f.name] = OwnDisturbance(kernel(*where, *fluid, cut), f.count * f.beads)
+        return fleet
 
     @property
     def sizes(self) -> list[tuple[int, int, int]]:
         """Fibers, beads of each, and number of the first fiber, of each family."""
         return [(f.count, f.beads, f.first) for f in self.families]
 
+    def observe(self, time: float, velocity: np.ndarray, extra: np.ndarray | None) -> None:
+        """As that of Group, without what beads find of themselves where that is removed."""
+        if self._own:
+            velocity = velocity - self.own_velocity
+        super().observe(time, velocity, extra)
+
+    @property
+    def own_velocity(self) -> np.ndarray:
+        """(B, 3) what beads find of themselves in the flow, where it is removed; 0 elsewhere [m/s]."""
+        velocity = np.zeros((self.beads, 3))
+        for family, part in zip(self.families, self.split(velocity), strict=True):
+            if own := self._own.get(family.name):
+                part.reshape(-1, 3)[:] = own.velocity
+        return velocity
+
+    def reaction(self, time_step: float) -> Reaction:
+        self._reaction = super().reaction(time_step)
+        return self._reaction
+
     def advance(self, time_step: float) -> None:
         self._step_length = time_step
+        if self._own:
+            for family, force in zip(self.families, self.split(self._reaction.force), strict=True):
+                if own := self._own.get(family.name):
+                    own.advance(force.reshape(-1, 3), time_step)
         super().advance(time_step)
 
     @property
@@ -139,6 +176,9 @@ class Fleet(Group):
             for family, stepper in zip(self.families, self.steppers, strict=True)
             for key, value in stepper.state().items()
         }
+        for family in self.families:
+            if own := self._own.get(family.name):
+                arrays[f"{family.name}/{OWN}"] = own.state().reshape(family.count, family.beads, -1, 3)
         buffer = io.BytesIO()
         np.savez(buffer, signature=self._signature(), step=step, time=time, **arrays)
         path = folder / STATE_FILE
@@ -164,14 +204,20 @@ class Fleet(Group):
             own = [_of_family(states[n], family.name) for n in held]
             offset = parts[held[0]].start
             try:
-                stepper.restore(merged_states(own, slice(family.first - offset, end - offset)))
+                part = slice(family.first - offset, end - offset)
+                stepper.restore(merged_states(own, part))
+                if disturbance := self._own.get(family.name):
+                    disturbance.restore(
+                        np.concatenate([o[OWN] for o in own])[part].reshape(-1, *own[0][OWN].shape[2:])
+                    )
             except (KeyError, ValueError) as error:
                 raise StateError(f"the fiber state {paths[held[0]]} cannot be read: {error}") from None
 
     def _read_state(self, path: Path, share: Share) -> dict[str, np.ndarray]:
         """The arrays of the file of a daemon, checked."""
         try:
-            names = [*HEADER, *(f"{family.name}/{key}" for family in self.families for key in forms(1, 2))]
+            keys = [*forms(1, 2), OWN]
+            names = [*HEADER, *(f"{family.name}/{key}" for family in self.families for key in keys)]
             state = read_arrays(path, names, 8 * MOST_NUMBERS * self._largest + SMALL)
             check_arrays(state, HEADER)
             signature = str(state["signature"])
@@ -186,7 +232,11 @@ class Fleet(Group):
         for family in self.families:
             part = share.part(family.total)
             try:
-                check_state(_of_family(state, family.name), part.stop - part.start, family.beads)
+                own = _of_family(state, family.name)
+                check_state(own, part.stop - part.start, family.beads)
+                if family.name in self._own:
+                    form = ("f", (part.stop - part.start, family.beads, range(SHELLS, SHELLS + 4), 3))
+                    check_arrays(own, {OWN: form})
             except ValueError as error:
                 raise StateError(
                     f"the fiber state {path} cannot be read: family {family.name}: {error}"

@@ -30,8 +30,9 @@ class Journal:
 
     `fibers.h5` holds the positions, and what the entry `record` names, of every `recordInterval`-th step and of the
     first. `daemon.dat` has a row a step: sentAt and arrivedAt by the clock of the day [s], the prediction gap [m/s],
-    <R^2>/L^2 of each family; with feedback also exchange, the power that the fluid gets, friction, Φ, and bending,
-    dE_b/dt [W]. `statistics.h5`, where it is asked for, has what `Gathering` gathers.
+    <R^2>/L^2 of each family; with feedback also exchange, the power that the fluid gets, friction, Φ, bending, dE_b/dt,
+    and own, that part of the exchange which beads would find of themselves and do not: exchange = own − friction −
+    bending [W]. `statistics.h5`, where it is asked for, has what `Gathering` gathers.
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class Journal:
         self._path = keep_earlier(folder / daemon_table(share))
         self._table = created(self._path, buffering=1)
         names = ["Time", "step", "sentAt", "arrivedAt", "gap", *(f"R2_{f.name}" for f in scene.families)]
-        names += ["exchange", "friction", "bending"] if scene.coupling.feedback else []
+        names += ["exchange", "friction", "bending", "own"] if scene.coupling.feedback else []
         self._table.write("# " + "\t".join(names) + "\n")
 
     def take(
@@ -96,11 +97,9 @@ class Journal:
         if self.scene.coupling.feedback:
             self.reaction = fleet.reaction(self.scene.time_step)
             rotation = rotation_of(extra) if extra.ndim == 3 else extra
-            powers = [
-                self.reaction.exchange(velocity, rotation),
-                self.reaction.friction,
-                self.reaction.bending,
-            ]
+            own = float(np.vdot(self.reaction.force, fleet.own_velocity))
+            exchange = self.reaction.exchange(velocity, rotation)
+            powers = [exchange, self.reaction.friction, self.reaction.bending, own]
         self._add_row(step, sent_at, arrived_at, gap, powers)
         if not self._recorded or step % self.scene.record_interval == 0:
             tension = [s.tension for s in fleet.steppers] if self.recorder.tension else None

@@ -20,13 +20,15 @@ def latest_time(case: Path | str, field: str) -> str | None:
     return max(times)[1] if times else None
 
 
-def read_velocity(case: Path | str, time: str, cells: tuple[int, int, int]) -> NDArray[np.float64]:
-    """U of a time folder, (3, nx, ny, nz) [m/s], also of a decomposed case. Raises ValueError for another count, or
-    a file that is not whole."""
+def read_velocity(
+    case: Path | str, time: str, cells: tuple[int, int, int], name: str = "U"
+) -> NDArray[np.float64]:
+    """U, or another vector, of a time folder, (3, nx, ny, nz) [m/s], also of a decomposed case. Raises ValueError for
+    another count, or a file that is not whole."""
     case, count = Path(case), int(np.prod(cells))
     parts = processors(case)
     if velocity_file(case / time) is not None or not parts:
-        values = _of_cells(case / time / "U", count)
+        values = _of_cells(case / time / name, count)
     else:
         values = np.empty((count, 3))
         left = np.ones(count, dtype=bool)
@@ -35,7 +37,7 @@ def read_velocity(case: Path | str, time: str, cells: tuple[int, int, int]) -> N
             places = read_list(file)
             if places.ndim != 1 or (len(places) and not 0 <= places.min() <= places.max() < count):
                 raise ValueError(f"{file} names cells that are not among the {count} of the mesh")
-            values[places] = _of_cells(part / time / "U", len(places))
+            values[places] = _of_cells(part / time / name, len(places))
             left[places] = False
         if left.any():
             raise ValueError(f"{case}: no processor folder has the cell {int(left.argmax())} of the mesh")

@@ -38,6 +38,8 @@ COMPLETE = "the run to time %g is complete; --fresh repeats it"
 class Carrier:
     """A flow on its way through time beside the fibers. All but `sample` and `on_cells` may be left as they are."""
 
+    cut = 1.0  # largest resolved wavenumber over π/Δx
+
     def sample(self, positions: np.ndarray, time: float, need: str):
         """As in gbm_plugin.flow, at the present time of the run."""
         raise NotImplementedError
@@ -114,7 +116,8 @@ class Run:
             raise CaseError(
                 f"{scene.case.parent} has no U in 0.orig or 0, after whose form the velocity is written"
             )
-        self.fleet = Fleet.seeded(scene, scene.origin, np.add(scene.origin, scene.box), start.time)
+        upper = np.add(scene.origin, scene.box)
+        self.fleet = Fleet.seeded(scene, scene.origin, upper, start.time, cut=carrier.cut)
         folder = scene.case / _name(start.time) if start.continues else None
         if folder:
             compare(scene)

@@ -135,6 +135,7 @@ class _SpectralFlow(Carrier):
     def __init__(self, scene: Scene, solver: SpectralSolver, cycles: int = 1):
         self.scene, self.solver, self.cycles = scene, solver, cycles
         self.tabulates = scene.forcing is None or scene.forcing.table
+        self.cut = (2 * solver.modes.cut + 1) / solver.cells
         # energy and power before the last step, and at its end
         self.before: tuple[float, float] | None = None
         self.now: tuple[float, float] | None = None

@@ -21,6 +21,7 @@ from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.share import Share
 from gbm_plugin.coupling.listen import listen
 from gbm_plugin.coupling.message import (
+    KEEP,
     NONCE_SIZE,
     Hello,
     Kind,
@@ -185,10 +186,12 @@ class FakeSolver:
         assert magic == b"GBMC"
         return Message(Kind(kind), step, moment, exactly(size), flags)
 
-    def sample(self, step: int, value: float = 0.1) -> Message:
+    def sample(self, step: int, value: float = 0.1, keep: bool = False) -> Message:
         beads = sum(f.count * f.beads for f in self.scene.families)
         values = np.full(6 * beads, value)
-        return Message(Kind.SAMPLE, step, step * self.scene.time_step, encode_array(values))
+        return Message(
+            Kind.SAMPLE, step, step * self.scene.time_step, encode_array(values), KEEP if keep else 0
+        )
 
     def serve_until(self, step: int) -> None:
         """A run like any other until the positions of this step are there."""
@@ -247,7 +250,7 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
 
 
 def welcome() -> Message:
-    return Message(Kind.WELCOME, 0, 0.0, encode_welcome("rotation", FAMILIES))
+    return Message(Kind.WELCOME, 0, 0.0, encode_welcome("rotation", False, FAMILIES))
 
 
 def greet(channel, first: Message, beads: int) -> None:

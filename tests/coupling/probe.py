@@ -32,7 +32,12 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
             assert greeted is not None, (case / "log.pimpleFoam").read_text()[-3000:]
             channel, first, hello = greeted
             channel.send(
-                Message(Kind.WELCOME, first.step, first.time, encode_welcome(need, [(len(positions), 1, 0)]))
+                Message(
+                    Kind.WELCOME,
+                    first.step,
+                    first.time,
+                    encode_welcome(need, False, [(len(positions), 1, 0)]),
+                )
             )
             step = first.step
             while True:

@@ -157,16 +157,20 @@ SOLVER_FAULTS = {
     "NaN": (lambda s: s.raw(s.sample(4, NAN).encode()), "SAMPLE of step 4 holds values that are not finite"),
     "NaN time": (lambda s: s.raw(header(s.sample(4), time=NAN)), "has the time nan"),
     "foreign folder": (
-        lambda s: s.raw(Message(Kind.SAVE, 4, 0.08, b"../../etc").encode()),
+        lambda s: s.raw(s.sample(4, keep=True).encode() + Message(Kind.SAVE, 4, 0.08, b"../../etc").encode()),
         "is not a time folder",
     ),
     "save of another step": (
-        lambda s: s.raw(Message(Kind.SAVE, 3, 0.06, b"0.06").encode()),
+        lambda s: s.raw(s.sample(4, keep=True).encode() + Message(Kind.SAVE, 3, 0.06, b"0.06").encode()),
         "SAVE is of step 3",
     ),
     "end with a payload": (
         lambda s: s.raw(Message(Kind.END, 3, 0.06, b"and more").encode()),
         "END of step 3 has 8 bytes",
+    ),
+    "nothing to save": (
+        lambda s: s.raw(Message(Kind.SAVE, 4, 0.08, b"0.08").encode()),
+        "received SAVE where SAMPLE or END must come",
     ),
     "early end": (lambda s: s.raw(Message(Kind.END, 1, 0.02).encode()), "END is of step 1"),
     "error": (
@@ -207,7 +211,8 @@ def test_daemon_with_a_solver_that_is(transport, fault, copy):
             solver.close()
         line = one_line(solver.daemon, "daemon")
     assert expected in line and str(prepared / "log.pimpleFoam") in line
-    assert records(prepared) == (5 if fault == "duplicated" else 4)
+    taken = fault in ("duplicated", "foreign folder", "save of another step")
+    assert records(prepared) == (5 if taken else 4)
     assert not solver.address.exists()
 
 
@@ -354,23 +359,27 @@ DAEMON_FAULTS = {
         _after_greeting(lambda n: positions(1, n).encode()[:500]),
         "was silent for",
     ),
-    "welcome without families": (_welcome(1, 0), DIFFERENT),
-    "welcome with a negative count": (_welcome(1, 1, -3, 4, 0), DIFFERENT),
+    "welcome without families": (_welcome(1, 0, 0), DIFFERENT),
+    "welcome with a negative count": (_welcome(1, 0, 1, -3, 4, 0), DIFFERENT),
     "welcome with too many beads": (
-        _welcome(1, 1, 1 << 40, 1 << 40, 0),
+        _welcome(1, 0, 1, 1 << 40, 1 << 40, 0),
         DIFFERENT,
     ),
     "welcome with fewer families than said": (
-        _welcome(1, 9, 3, 4, 0),
+        _welcome(1, 0, 9, 3, 4, 0),
         DIFFERENT,
     ),
     "welcome that wants the unknown": (
-        _welcome(7, 1, 12, 6, 0),
+        _welcome(7, 0, 1, 12, 6, 0),
         "WELCOME asks for the unknown number 7 beside the velocity",
     ),
     "welcome with 179 million beads": (
-        _welcome(1, 1, 178_956_970, 1, 0),
+        _welcome(1, 0, 1, 178_956_970, 1, 0),
         f"{DIFFERENT}: 1 178956970 1 0, and 1 12 6 0",
+    ),
+    "welcome with feedback that nobody asked for": (
+        _welcome(1, 1, 1, 12, 6, 0),
+        "WELCOME has feedback 1 and constant/fiberProperties 0",
     ),
     "welcome with an odd byte": (
         lambda channel, first, beads: channel.send(replace(welcome(), payload=welcome().payload + b"!")),
@@ -696,7 +705,7 @@ def test_disk_full_while_the_state_of_the_fibers_is_written(long_case, small_dis
     with FakeSolver(long_case) as solver:
         solver.connect()
         solver.serve_until(4)
-        solver.raw(Message(Kind.SAVE, 4, 0.08, b"0.08").encode() + solver.sample(4).encode())
+        solver.raw(solver.sample(4, keep=True).encode() + Message(Kind.SAVE, 4, 0.08, b"0.08").encode())
         assert "No space left" in solver.last_word()
         solver.close()
         line = one_line(solver.daemon, "daemon")

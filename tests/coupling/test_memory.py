@@ -26,7 +26,7 @@ def peak(case: Path, transport: str, beads: int) -> tuple[int, int]:
     try:
         with listen(case, coupling, case / "log.pimpleFoam") as listener:
             channel, first, _ = listener.greet(lambda: solver.poll() is not None)
-            welcome = encode_welcome("gradient", [(beads // 2, 2, 0)])
+            welcome = encode_welcome("gradient", False, [(beads // 2, 2, 0)])
             channel.send(Message(Kind.WELCOME, first.step, first.time, welcome))
             positions = np.random.default_rng(1).uniform(0, 6, (beads, 3))
             channel.send(Message(Kind.POSITIONS, first.step, first.time, encode_array(positions)))

@@ -90,8 +90,9 @@ def test_sample_round_trip(need, beads, rng):
 
 
 def test_welcome_is_a_list_of_integers():
-    assert struct.unpack("<8q", encode_welcome("gradient", [(60, 20, 5), (1, 2, 0)])) == (
+    assert struct.unpack("<9q", encode_welcome("gradient", True, [(60, 20, 5), (1, 2, 0)])) == (
         2,
+        1,
         2,
         60,
         20,
@@ -108,11 +109,12 @@ def test_welcome_is_a_list_of_integers():
         (b"", "short message: 0 bytes"),
         (b"GBMC" + bytes(35), "short message: 39 bytes"),
         (b"HTTP" + bytes(36), "not a message of a gbm plugin"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", 3, 1, 0, 0, 0, 0.0, 0), f"version 3 of .* this daemon {VERSION}"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION + 1, 1, 0, 0, 0, 0.0, 0), f"version {VERSION + 1}"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 0, 0, 0, 0, 0.0, 0), "unknown kind 0"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 12, 0, 0, 0, 0.0, 0), "unknown kind 12"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 13, 0, 0, 0, 0.0, 0), "unknown kind 13"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 3, 4, 0, 0, 0.0, 0), "POSITIONS has unknown flags: 4"),
-        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 1, 0, 0, 0.0, 0), "SAMPLE has unknown flags: 1"),
+        (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 5, 0, 0, 0.0, 0), "SAMPLE has unknown flags: 5"),
         (b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 7, 0, 0.0, 0), "SAMPLE has 7 where 0 is reserved"),
         (
             b"GBMC" + struct.pack("<HHIIqdQ", VERSION, 4, 0, 0, 0, 0.0, MAX_TEXT + 1),

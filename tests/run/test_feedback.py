@@ -47,7 +47,10 @@ def test_the_energy_that_leaves_the_fluid_is_what_fibers_get(whole):
     flow, fibers = tables(whole)
     assert np.all(fibers["friction"] > 0)
     size = fibers["friction"]
-    assert np.abs((fibers["exchange"] + fibers["friction"] + fibers["bending"]) / size).max() < 1e-12
+    assert (
+        np.abs((fibers["exchange"] - fibers["own"] + fibers["friction"] + fibers["bending"]) / size).max()
+        < 1e-12
+    )
     volume = (2 * np.pi) ** 3
     np.testing.assert_allclose(flow["exchange"] * volume, fibers["exchange"], atol=1e-11 * size.max())
 

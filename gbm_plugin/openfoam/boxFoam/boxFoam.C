@@ -21,6 +21,7 @@ Description
 \*---------------------------------------------------------------------------*/
 
 #include "adamsBashforth3.H"
+#include "feedback.H"
 #include "flowState.H"
 #include "kinematicViscosity.H"
 #include "refusals.H"
@@ -107,6 +108,11 @@ int main(int argc, char *argv[])
         }
     };
 
+    if (feedback::wanted(runTime))
+    {
+        // what fibers do to the flow is a part of its rate
+        runTime.functionObjects().start();
+    }
     evaluate();
     complete();
     U.correctBoundaryConditions();

@@ -1,6 +1,7 @@
 #include "fiberCoupling.H"
 #include "allowedEntries.H"
 #include "consistentStart.H"
+#include "feedback.H"
 #include "keepEarlier.H"
 #include "kinematicViscosity.H"
 #include "addToRunTimeSelectionTable.H"
@@ -73,6 +74,9 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
     writeFile(mesh_, name, "coupling"),
     deltaT_(time.deltaTValue()),
     step_(time.timeIndex()),
+    saved_(step_),
+    feedback_(nullptr),
+    rho_(1),
     wanted_(NOTHING)
 {
     const fatalErrors guard;
@@ -103,20 +107,26 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
     sampler_ = sampler::New(fiberProperties, mesh_);
     beads_.reset(new beadExchange(box_(), locator::of(mesh_)));
 
+    if (feedback::wanted(time))
+    {
+        rho_ = fiberProperties.lookupOrDefault<scalar>("rho", 1);
+        feedback_ = &fv::fiberFeedback::addTo(mesh_, UName_);
+        feedback_->renewWith([this]() { const fatalErrors fatal; advance(); });
+    }
+
     if (Pstream::master())
     {
         keepEarlier(baseTimeDir()/"coupling.dat");
         resetFile("coupling");
         writeHeader(file(), "Fiber coupling: seconds per step");
         writeCommented(file(), "Time");
-        for
-        (
-            const char* column :
-            {
-                "wait", "location", "sampling", "sending",
-                "arrivedAt", "sentAt"
-            }
-        )
+        wordList columns({"wait", "location", "sampling", "sending"});
+        if (feedback_)
+        {
+            columns.append(wordList({"forces", "spreading"}));
+        }
+        columns.append(wordList({"arrivedAt", "sentAt"}));
+        for (const word& column : columns)
         {
             writeTabbed(file(), column);
         }
@@ -304,7 +314,7 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
 }
 
 
-void Foam::functionObjects::fiberCoupling::sendSample
+Foam::scalarList Foam::functionObjects::fiberCoupling::sendSample
 (
     bool provisional,
     times& t
@@ -320,31 +330,86 @@ void Foam::functionObjects::fiberCoupling::sendSample
     );
     t.sampling += watch.lap();
 
-    const scalarList values(beads_->collect(std::move(sampled), n));
+    scalarList values(beads_->collect(std::move(sampled), n));
 
     label start = 0;
     for (fiberDaemon& daemon : daemons_)
     {
-        // with the case's own fields of this time, which are on disk already
-        if (time_.writeTime() && !provisional)
-        {
-            daemon.save(step_, time_.value(), timeFolder());
-        }
         daemon.sendSample
         (
             step_,
             time_.value(),
-            SubList<scalar>(values, n*daemon.beads(), start)
+            SubList<scalar>(values, n*daemon.beads(), start),
+            time_.writeTime() && !provisional
         );
         start += n*daemon.beads();
     }
     t.sending += watch.lap();
+
+    return values;
+}
+
+
+void Foam::functionObjects::fiberCoupling::receiveForces
+(
+    const scalarList& sampled,
+    times& t
+)
+{
+    stopwatch watch;
+    const label n = 3 + components(wanted_);
+    const label beads = sampled.size()/n;
+    scalarList loads(6*beads);
+
+    label start = 0;
+    for (fiberDaemon& daemon : daemons_)
+    {
+        daemon.receiveForces
+        (
+            step_,
+            time_.value(),
+            1e-6*deltaT_,
+            SubList<scalar>(loads, 6*daemon.beads(), start)
+        );
+        start += 6*daemon.beads();
+    }
+    t.forces += watch.lap();
+
+    // the power of a bead, in the words of what was sampled
+    scalar exchange = 0;
+    for (label bead = 0; bead < beads; ++bead)
+    {
+        const scalar* u = sampled.cdata() + n*bead;
+        const scalar* load = loads.cdata() + 6*bead;
+        const vector rotation
+        (
+            wanted_ == ROTATION
+          ? vector(u[3], u[4], u[5])
+          : 0.5*vector(u[10] - u[8], u[5] - u[9], u[6] - u[4])
+        );
+        exchange +=
+            (vector(load[0], load[1], load[2]) & vector(u[0], u[1], u[2]))
+          + (vector(load[3], load[4], load[5]) & rotation);
+    }
+    reduce(exchange, sumOp<scalar>());
+
+    const scalarField& V = mesh_.V();
+    *feedback::exchange() = exchange/(rho_*gSum(V));
+
+    vectorField force
+    (
+        sampler_->spread(beads_->distribute(std::move(loads), 6), beads_())
+    );
+    force /= rho_*V;
+    feedback_->set(force, step_);
+    t.spreading += watch.lap();
 }
 
 
 void Foam::functionObjects::fiberCoupling::exchange()
 {
-    times t{0, 0, 0, 0};
+    times t{0, 0, 0, 0, 0, 0};
+    scalarList sampled;
     scalar arrived = 0;
     bool provisional = true;
 
@@ -358,13 +423,11 @@ void Foam::functionObjects::fiberCoupling::exchange()
         beads_->locate(std::move(positions));
         t.location += watch.lap();
 
-        // before the daemons write their state, which completes a time folder
-        if (writeCloud_ && time_.writeTime() && !provisional)
-        {
-            writeFiberCloud(mesh_, beads_(), families_);
-        }
-
-        sendSample(provisional, t);
+        sampled = sendSample(provisional, t);
+    }
+    if (feedback_)
+    {
+        receiveForces(sampled, t);
     }
 
     writeTimes(t, arrived, timeOfDay());
@@ -379,6 +442,10 @@ void Foam::functionObjects::fiberCoupling::writeTimes
 )
 {
     scalarList spent({t.wait, t.location, t.sampling, t.sending});
+    if (feedback_)
+    {
+        spent.append(scalarList({t.forces, t.spreading}));
+    }
     Pstream::listCombineGather(spent, maxEqOp<scalar>());
 
     if (Pstream::master())
@@ -392,6 +459,49 @@ void Foam::functionObjects::fiberCoupling::writeTimes
             << setprecision(17)
             << token::TAB << arrived << token::TAB << left
             << setprecision(writePrecision_) << endl;
+    }
+}
+
+
+void Foam::functionObjects::fiberCoupling::advance()
+{
+    if (mag(time_.deltaTValue() - deltaT_) > 1e-9*deltaT_)
+    {
+        FatalErrorInFunction
+            << "deltaT changed from " << deltaT_ << " to "
+            << time_.deltaTValue() << " during the run: fibers move with a"
+            << " fixed time step, which may change at a restart"
+            << exit(FatalError);
+    }
+    if (time_.timeIndex() != step_ + 1)
+    {
+        FatalErrorInFunction
+            << "step " << time_.timeIndex() << " follows step " << step_
+            << ": the coupling must be executed in every step"
+            << exit(FatalError);
+    }
+
+    ++step_;
+    exchange();
+}
+
+
+void Foam::functionObjects::fiberCoupling::save()
+{
+    if (!time_.writeTime() || saved_ == step_)
+    {
+        return;
+    }
+    saved_ = step_;
+
+    // before the daemons write their state, which completes a time folder
+    if (writeCloud_)
+    {
+        writeFiberCloud(mesh_, beads_(), families_);
+    }
+    for (fiberDaemon& daemon : daemons_)
+    {
+        daemon.save(step_, time_.value(), timeFolder());
     }
 }
 
@@ -434,29 +544,28 @@ bool Foam::functionObjects::fiberCoupling::execute()
 {
     const fatalErrors guard;
 
-    if (postProcess || time_.timeIndex() == step_)
+    if (postProcess)
     {
-        return true;    // executed again at the end of the run
+        return true;
     }
 
-    if (mag(time_.deltaTValue() - deltaT_) > 1e-9*deltaT_)
+    // executed again at the end of the run, or after a solver that had to know
+    // the forces of this step
+    if (time_.timeIndex() != step_)
     {
-        FatalErrorInFunction
-            << "deltaT changed from " << deltaT_ << " to "
-            << time_.deltaTValue() << " during the run: fibers move with a"
-            << " fixed time step, which may change at a restart"
-            << exit(FatalError);
+        advance();
     }
-    if (time_.timeIndex() != step_ + 1)
+    if (feedback_ && feedback_->used() != step_)
     {
         FatalErrorInFunction
-            << "step " << time_.timeIndex() << " follows step " << step_
-            << ": the coupling must be executed in every step"
-            << exit(FatalError);
+            << "feedback is yes, and " << time_.controlDict().lookupOrDefault
+               <word>("application", "this solver")
+            << " does not look at fvOptions, which bring it; pimpleFoam,"
+            << " pisoFoam and boxFoam do" << exit(FatalError);
     }
 
-    ++step_;
-    exchange();
+    // with the case's own fields of this time, which are on disk already
+    save();
 
     return true;
 }

@@ -1,4 +1,6 @@
 #include "fiberDaemon.H"
+#include "scalarList.H"
+#include "Switch.H"
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
 
@@ -19,7 +21,12 @@ Foam::fiberDaemon::fiberDaemon
     ),
     families_(readFamilies(fiberProperties, caseFolder, share)),
     beads_(0),
-    wanted_(NOTHING)
+    wanted_(NOTHING),
+    feedback_
+    (
+        fiberProperties.subOrEmptyDict("coupling")
+       .lookupOrDefault<Switch>("feedback", false)
+    )
 {
     hello.appendText(connection::nonce());
     connection_->send(hello);
@@ -29,7 +36,7 @@ Foam::fiberDaemon::fiberDaemon
     (
         connection_->receive
         (
-            message::WELCOME, hello.head.step, 16, message::maxText
+            message::WELCOME, hello.head.step, 24, message::maxText
         )
     );
 }
@@ -39,8 +46,8 @@ Foam::fiberDaemon::fiberDaemon
 
 void Foam::fiberDaemon::readWelcome(const message& m)
 {
-    // what to sample, how many families, then fibers, beads and the first
-    // fiber of each
+    // what to sample, whether forces come back, how many families, then fibers,
+    // beads and the first fiber of each
     const std::vector<std::int64_t> n(m.values<std::int64_t>());
 
     if (n[0] < NOTHING || n[0] > GRADIENT)
@@ -52,6 +59,17 @@ void Foam::fiberDaemon::readWelcome(const message& m)
         );
     }
 
+    if (n[1] != std::int64_t(feedback_))
+    {
+        connection_->fail
+        (
+            "WELCOME has feedback " + std::to_string(n[1])
+          + " and constant/fiberProperties " + std::to_string(int(feedback_))
+          + ": daemon and solver are not on the same case, or it was edited in"
+            " between"
+        );
+    }
+
     std::vector<std::int64_t> ours({families_.size()});
     std::int64_t beads = 0;
     for (const fiberFamily& f : families_)
@@ -59,7 +77,7 @@ void Foam::fiberDaemon::readWelcome(const message& m)
         ours.insert(ours.end(), {f.count, f.beads, f.first});
         beads += f.size();
     }
-    const std::vector<std::int64_t> theirs(n.begin() + 1, n.end());
+    const std::vector<std::int64_t> theirs(n.begin() + 2, n.end());
 
     if (theirs != ours || m.payload.size() % sizeof(std::int64_t))
     {
@@ -96,6 +114,45 @@ void Foam::fiberDaemon::readWelcome(const message& m)
 }
 
 
+void Foam::fiberDaemon::checkFinite
+(
+    const char* what,
+    const UList<scalar>& numbers,
+    const label n
+) const
+{
+    forAll(numbers, i)
+    {
+        if (!std::isfinite(numbers[i]))
+        {
+            connection_->fail
+            (
+                std::string(what) + " are not finite at bead "
+              + std::to_string((i/n) % beads_)
+            );
+        }
+    }
+}
+
+
+void Foam::fiberDaemon::checkTime
+(
+    const message& m,
+    const scalar time,
+    const scalar tolerance
+) const
+{
+    if (mag(m.head.time - time) > tolerance)
+    {
+        connection_->fail
+        (
+            m.name() + " are of time " + Foam::name(m.head.time)
+          + ", expected time " + Foam::name(time)
+        );
+    }
+}
+
+
 // * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
 
 std::uint32_t Foam::fiberDaemon::receivePositions
@@ -117,31 +174,16 @@ std::uint32_t Foam::fiberDaemon::receivePositions
         )
     );
 
-    if (mag(m.head.time - time) > tolerance)
-    {
-        connection_->fail
+    checkTime(m, time, tolerance);
+    checkFinite
+    (
+        "POSITIONS",
+        UList<scalar>
         (
-            "POSITIONS are of time " + Foam::name(m.head.time)
-          + ", expected time " + Foam::name(time)
-        );
-    }
-
-    forAll(positions, i)
-    {
-        const point& p = positions[i];
-        if
-        (
-            !std::isfinite(p.x())
-         || !std::isfinite(p.y())
-         || !std::isfinite(p.z())
-        )
-        {
-            connection_->fail
-            (
-                "POSITIONS are not finite at bead " + std::to_string(i)
-            );
-        }
-    }
+            reinterpret_cast<scalar*>(positions.begin()), 3*positions.size()
+        ),
+        3
+    );
 
     return m.head.flags;
 }
@@ -164,7 +206,8 @@ void Foam::fiberDaemon::sendSample
 (
     const label step,
     const scalar time,
-    const UList<scalar>& values
+    const UList<scalar>& values,
+    const bool keep
 )
 {
     const label n = 3 + components(wanted_);
@@ -180,6 +223,7 @@ void Foam::fiberDaemon::sendSample
     }
 
     message m(message::SAMPLE, step, time);
+    m.head.flags = keep ? message::keep : 0;
     m.head.size = values.size()*sizeof(scalar);
     connection_->begin(m);
 
@@ -208,6 +252,40 @@ void Foam::fiberDaemon::sendSample
     part.reserve(min(beads_, beadsOfPart)*max(label(3), n - 3));
     add(0, 3);
     add(3, n);
+}
+
+
+void Foam::fiberDaemon::receiveForces
+(
+    const label step,
+    const scalar time,
+    const scalar tolerance,
+    UList<scalar> loads
+)
+{
+    // on the wire the forces of all beads come before the torques of all
+    scalarList came(loads.size());
+    const message m
+    (
+        connection_->receive
+        (
+            message::FORCES,
+            step,
+            std::uint64_t(came.size())*sizeof(scalar),
+            reinterpret_cast<char*>(came.begin())
+        )
+    );
+    checkTime(m, time, tolerance);
+    checkFinite("FORCES", came, 3);
+
+    for (label bead = 0; bead < beads_; ++bead)
+    {
+        std::copy_n(came.cdata() + 3*bead, 3, loads.begin() + 6*bead);
+        std::copy_n
+        (
+            came.cdata() + 3*(beads_ + bead), 3, loads.begin() + 6*bead + 3
+        );
+    }
 }
 
 

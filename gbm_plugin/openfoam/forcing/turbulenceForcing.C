@@ -71,6 +71,10 @@ void Foam::fv::turbulenceForcing::start()
     applied_.setSize(1, false);
     consistentStart(mesh_, UName_, phiName_);
     restoreState();
+    if (feedback::wanted(mesh_.time()))
+    {
+        exchange_ = feedback::exchange();
+    }
 
     if (writeToFile() && Pstream::master())
     {
@@ -92,6 +96,10 @@ void Foam::fv::turbulenceForcing::start()
         )
         {
             writeTabbed(file(), column);
+        }
+        if (exchange_)
+        {
+            writeTabbed(file(), "exchange");
         }
         file() << endl;
     }
@@ -188,7 +196,7 @@ void Foam::fv::turbulenceForcing::writeRow
     // over the step that ends here; at a start no step has ended
     const scalar epsilonBudget =
         hasOld_
-      ? 0.5*(power + powerOld_) - (s.k - kOld_)/deltaTOld_
+      ? 0.5*(power + exchange() + powerOld_) - (s.k - kOld_)/deltaTOld_
       : s.epsilonLaplacian;
 
     if (Pstream::master())
@@ -206,8 +214,12 @@ void Foam::fv::turbulenceForcing::writeRow
             << token::TAB << power
             << token::TAB << s.mean.x()
             << token::TAB << s.mean.y()
-            << token::TAB << s.mean.z()
-            << endl;
+            << token::TAB << s.mean.z();
+        if (exchange_)
+        {
+            file() << token::TAB << exchange();
+        }
+        file() << endl;
     }
 }
 
@@ -231,7 +243,7 @@ void Foam::fv::turbulenceForcing::keep
 )
 {
     kOld_ = now.k;
-    powerOld_ = power;
+    powerOld_ = power + exchange();
     deltaTOld_ = mesh_.time().deltaTValue();
     hasOld_ = true;
 }

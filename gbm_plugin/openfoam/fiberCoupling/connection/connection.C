@@ -33,7 +33,11 @@ Foam::autoPtr<Foam::connection> Foam::connection::New
 {
     allowedEntries
     (
-        coupling, {"transport", "timeout", "host", "port", "daemons"}
+        coupling,
+        {
+            "transport", "timeout", "host", "port", "daemons", "feedback",
+            "ownDisturbance"
+        }
     );
 
     const word transport =

@@ -31,11 +31,11 @@ Foam::string Foam::message::name() const
     static const char* names[] =
     {
         "HELLO", "WELCOME", "POSITIONS", "SAMPLE", "SAVE", "END", "GOODBYE",
-        "ERROR", "WAIT", "CHALLENGE", "PROOF"
+        "ERROR", "WAIT", "CHALLENGE", "PROOF", "FORCES"
     };
 
     return
-        head.type >= HELLO && head.type <= PROOF
+        head.type >= HELLO && head.type <= FORCES
       ? string(names[head.type - 1])
       : string("message of unknown type " + std::to_string(head.type));
 }

@@ -145,6 +145,9 @@ Foam::scalarList Foam::beadExchange::collect
 
     put(numbersFor(me), sampled.cdata() + n*starts_[me]);
 
+    found_.setSize(Pstream::nProcs());
+    found_ = labelList();
+    found_[me] = numbersFor(me);
     if (Pstream::parRun())
     {
         PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
@@ -172,9 +175,9 @@ Foam::scalarList Foam::beadExchange::collect
             if (rank != me && received[rank])
             {
                 UIPstream from(rank, buffers);
-                const labelList numbers(from);
+                from >> found_[rank];
                 const scalarList values(from);
-                put(numbers, values.cdata());
+                put(found_[rank], values.cdata());
             }
         }
     }
@@ -184,6 +187,65 @@ Foam::scalarList Foam::beadExchange::collect
         FatalErrorInFunction
             << found << " of " << brought_ << " beads were found in the mesh"
             << exit(FatalError);
+    }
+
+    return result;
+}
+
+
+Foam::scalarList Foam::beadExchange::distribute
+(
+    scalarList&& values,
+    const label n
+) const
+{
+    if (!Pstream::parRun())
+    {
+        return std::move(values);
+    }
+
+    const auto valuesOf = [&](const labelUList& numbers)
+    {
+        scalarList some(n*numbers.size());
+        scalar* out = some.begin();
+        for (const label number : numbers)
+        {
+            out = std::copy_n(values.cdata() + n*number, n, out);
+        }
+        return some;
+    };
+
+    const label me = Pstream::myProcNo();
+    PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
+    forAll(found_, rank)
+    {
+        if (rank != me && found_[rank].size())
+        {
+            UOPstream to(rank, buffers);
+            to << valuesOf(found_[rank]);
+        }
+    }
+    buffers.finishedSends();
+
+    scalarList result(n*numbers_.size());
+    for (label rank = 0; rank < Pstream::nProcs(); ++rank)
+    {
+        const label count = n*(starts_[rank + 1] - starts_[rank]);
+        if (!count)
+        {
+            continue;
+        }
+        SubList<scalar> part(result, count, n*starts_[rank]);
+        if (rank == me)
+        {
+            part = valuesOf(found_[me]);
+        }
+        else
+        {
+            UIPstream from(rank, buffers);
+            const scalarList own(from);
+            part = own;
+        }
     }
 
     return result;

@@ -90,6 +90,108 @@ void sampleWith
     sampleAll(interpolant, cells, beads, wanted, u, values);
 }
 
+
+//- What 'spread' of sampler gives, in the order of the points
+template<class Interpolant>
+INLINE void spreadAll
+(
+    const Interpolant& interpolant,
+    const lattice& cells,
+    const beadExchange& beads,
+    const scalar* loads,
+    vector* own,
+    vector* neighbours,
+    const label nCells
+)
+{
+    constexpr int N = Interpolant::reach;
+    constexpr int below = Interpolant::below;
+    const vector perCell(cells.box().perCell());
+    const Vector<label> stride(cells.strides());
+
+    forAll(beads.points(), bead)
+    {
+        const scalar* load = loads + 6*beads.placeOf(bead);
+        vector x;
+        const label* slot =
+            cells.slots().cdata() + cells.around(beads.points()[bead], x)
+          - below*(stride.x() + stride.y() + stride.z());
+
+        double w[3][N], s[3][N];
+        for (direction d = 0; d < 3; ++d)
+        {
+            interpolant.weights(x[d], w[d], s[d]);
+            for (int m = 0; m < N; ++m)
+            {
+                s[d][m] *= perCell[d];
+            }
+        }
+        const vector force(load[0], load[1], load[2]);
+        const vector couple(0.5*load[3], 0.5*load[4], 0.5*load[5]);
+
+        for (int k = 0; k < N; ++k)
+        for (int j = 0; j < N; ++j)
+        {
+            // couple x slopes, by its part of the weights and slopes in x
+            const double yz = w[1][j]*w[2][k];
+            const vector slopes(0, s[1][j]*w[2][k], w[1][j]*s[2][k]);
+            if (yz == 0 && slopes.y() == 0 && slopes.z() == 0)
+            {
+                continue;
+            }
+            const vector byValue(yz*force + (couple ^ slopes));
+            const vector bySlope(0, yz*couple.z(), -yz*couple.y());
+            const label* values = slot + stride.y()*j + stride.z()*k;
+
+            for (int i = 0; i < N; ++i)
+            {
+                const label value = values[i];
+                vector& target =
+                    value < nCells ? own[value] : neighbours[value - nCells];
+                target += w[0][i]*byValue + s[0][i]*bySlope;
+            }
+        }
+    }
+}
+
+#define SPREAD_WITH(interpolation)                                             \
+VECTORISED                                                                     \
+void spreadWith                                                                \
+(                                                                              \
+    const interpolation& interpolant, const lattice& cells,                    \
+    const beadExchange& beads, const scalar* loads, vector* own,               \
+    vector* neighbours, const label nCells                                     \
+)                                                                              \
+{                                                                              \
+    spreadAll(interpolant, cells, beads, loads, own, neighbours, nCells);      \
+}
+
+SPREAD_WITH(trilinear)
+SPREAD_WITH(cubic)
+SPREAD_WITH(quintic)
+
+}
+
+
+template<class Interpolant>
+Foam::vectorField Foam::latticeSampler<Interpolant>::spread
+(
+    const UList<scalar>& loads,
+    const beadExchange& beads
+) const
+{
+    static const Interpolant interpolant = Interpolant();
+
+    vectorField cells(lattice_.nCells(), Zero);
+    List<vector> neighbours(lattice_.nNeighbours(), Zero);
+    spreadWith
+    (
+        interpolant, lattice_, beads, loads.cdata(), cells.begin(),
+        neighbours.begin(), cells.size()
+    );
+    lattice_.addBack(neighbours, cells);
+
+    return cells;
 }
 
 

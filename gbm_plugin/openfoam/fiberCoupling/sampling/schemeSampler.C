@@ -66,3 +66,18 @@ Foam::scalarList Foam::schemeSampler::sample
 
     return values;
 }
+
+
+Foam::vectorField Foam::schemeSampler::spread
+(
+    const UList<scalar>&,
+    const beadExchange&
+) const
+{
+    FatalErrorInFunction
+        << "feedback of fibers is spread with the weights of their sampling,"
+        << " which interpolation " << scheme_ << " does not give; allowed:"
+        << " trilinear cubic quintic" << exit(FatalError);
+
+    return vectorField();
+}
