@@ -19,21 +19,21 @@ from .scene import Family, Scene
 from .verdict import AFFORDABLE, sub_steps
 
 # the task by which machines are compared, and its time where these were measured [s of one core]
-TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 7
+TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 15
 
-BOX_FOAM = 62e-9  # a step, for each cell [s]
+BOX_FOAM = 3.0e-9  # a step, for each cell and log2(cells) [s]
 OUTER, PRESSURE = (
     1.6e-6,
     0.25e-6,
 )  # of pimpleFoam and pisoFoam: an outer corrector, and each pressure equation in it
 STEP = 0.4e-3  # beside the cells, in every step of a solver: its log, its tables
-SAMPLE = {"trilinear": 0.16e-6, "cubic": 0.35e-6, "quintic": 1.0e-6}  # a bead; other words, OpenFOAM's own:
+SAMPLE = {"trilinear": 0.1e-6, "cubic": 0.2e-6, "quintic": 0.4e-6}  # a bead; other words, OpenFOAM's own:
 SAMPLE_OTHER = 1.0e-6
 CACHE, MISSED = (
     24e6,
     {"trilinear": 1e-6, "cubic": 2e-6, "quintic": 6e-6},
 )  # bytes of U, beyond which a bead takes more
-EXCHANGE, BEAD = 0.3e-3, 0.15e-6  # of a step: to find and send beads
+EXCHANGE, BEAD = 0.3e-3, 0.1e-6  # of a step: to find and send beads
 DAEMON, TAKEN = 0.8e-3, 46e-9  # a step of the daemon, and what it does with each bead beside moving it
 MOVED = {  # a bead in one step of an integrator: c_0 + c_1 N + c_2 N^2, N beads in its fiber [s]
     ("ab3", "freeDrain"): (22e-9, 0, 0),
@@ -44,8 +44,8 @@ MOVED = {  # a bead in one step of an integrator: c_0 + c_1 N + c_2 N^2, N beads
 ATTEMPTS = 1.5  # steps of implicit and auto in a step of the flow, of all fibers in the mean
 START, PREPARED = 3.5, 2e-6  # programs, kernels; initial field and mesh, for each cell [s]
 DISK, RECORD = 200e6, 2e-3  # bytes a second into time folders; seconds of a record
-PROGRAMS = 330e6  # bytes of solver, daemon and `gbm run` without cells and beads
-CELL, CELL_OTHER, BEAD_MEMORY = 420, 2300, 1300  # bytes: boxFoam's, others', the daemon's
+PROGRAMS = 380e6  # bytes of solver, daemon and `gbm run` without cells and beads
+CELL, CELL_OTHER, BEAD_MEMORY = 900, 1500, 4000  # bytes, at their highest: boxFoam, other solvers, the daemon
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def _flow_step(scene: Scene, cells: int) -> float | None:
     if not cells:
         return None
     if scene.application == "boxFoam":
-        return STEP + BOX_FOAM * cells
+        return STEP + BOX_FOAM * cells * math.log2(cells)
     if scene.application not in ("pimpleFoam", "pisoFoam"):
         return None
     name = "PIMPLE" if scene.application == "pimpleFoam" else "PISO"
