@@ -122,7 +122,7 @@ def _family(f: Family, scene: Scene, chosen: _Choices) -> Item:
         if there
     ]
     extras += [value for law in LAWS if (value := getattr(f.model, law)) in ("asPrinted", "discreteRod")]
-    words = ", ".join([f"{f.count} x {f.beads} beads", WORDS[f.model.mobility], *extras, how])
+    words = ", ".join([f"{f.count} x {f.beads}", WORDS[f.model.mobility], *extras, how])
     if chosen.of_family("beads", f.name) == "auto":
         why = f"beads auto; {why}"
     return Item(f.name, words, why)
@@ -135,7 +135,7 @@ def _steps(f: Family, scene: Scene, chosen: _Choices) -> tuple[str, str]:
     if f.model.integrator == "ab3":
         return f"ab3, {steps}", f"{source}, eq. (10)" if count > 1 else source
     if f.model.integrator == "implicit":
-        return "implicit, by error", source
+        return "implicit by error", source
     if count <= AFFORDABLE:
-        return "ab3 or implicit, by error", f"auto: eq. (10) asks {count}"
-    return "implicit, by error", f"auto: eq. (10) asks {count}"
+        return "ab3, implicit by error", f"auto: eq. (10) asks {count}"
+    return "implicit by error", f"auto: eq. (10) asks {count}"

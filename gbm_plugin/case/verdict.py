@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ..scales import coupling_error, coupling_step
 from .beads import bead_error, enough_beads
 from .expected import Expected
 from .feedback import NEGLIGIBLE, STABLE, TOO_LARGE, cell_size, exchange_step, own_ratio, removes_own
@@ -18,7 +19,10 @@ GOOD, DOUBTFUL, WRONG = "good", "doubtful", "wrong"
 CELLS = (2.1, 3.2)  # dx/eta: k_max eta = 1.5 and 1 (Pope, Turbulent Flows, 2000, section 9.1)
 COURANT = (0.7, 1.0)  # of an explicit solver, over its limit: the largest speed is an estimate
 IMPLICIT_COURANT = (1.0, 5.0)  # of the others
-FORECAST = (0.15, 0.5)  # deltaT/tau_eta: beads go on from one sample a step, extrapolated along their paths
+FORECAST = (
+    1e-3,
+    1e-2,
+)  # error of L in tau_eta of beads that go on from one sample a step, extrapolated along their paths
 AFFORDABLE = 5  # sub-steps of ab3 that auto takes before it goes over to implicit
 SUB_STEPS = (1000, 1_000_000)  # of ab3: dear, and refused
 ENDS = (1e-2, 5e-2)  # error of the ends of a fiber by its number of beads
@@ -112,10 +116,11 @@ def _of_the_flow(scene: Scene, flow: Expected) -> list[Verdict]:
             change = f"deltaT {_below(limits[0] * narrow / flow.speed)} (controlDict)"
             found.append(_graded("Courant", courant, limits, asked, change))
     if flow.kolmogorov_time:
-        ratio, longest = step / flow.kolmogorov_time, FORECAST[0] * flow.kolmogorov_time
-        change = f"deltaT {_below(longest)} (controlDict)"
-        asked = f"up to {FORECAST[0]:g}: one sample a step, foreseen"
-        found.append(_graded("dt/tau_eta", ratio, FORECAST, asked, change))
+        tau = flow.kolmogorov_time
+        limits = (coupling_step(FORECAST[0], 1.0), coupling_step(FORECAST[1], 1.0))
+        asked = f"one sample a step: {coupling_error(step, tau):.1g} L in tau_eta"
+        change = f"deltaT {_below(limits[0] * tau)} (controlDict)"
+        found.append(_graded("dt/tau_eta", step / tau, limits, asked, change))
     return found
 
 

@@ -118,7 +118,7 @@ def test_a_wrong_number_is_noted_when_it_runs(path):
     set_entry(path / "system/controlDict", "deltaT", "0.5")
     said = notes(read_scene(path))
     assert any(
-        n.startswith("dt/tau_eta is 0.612, wrong") and n.endswith("change to deltaT 0.12 (controlDict)")
+        n.startswith("dt/tau_eta is 0.612, wrong") and n.endswith("change to deltaT 0.22 (controlDict)")
         for n in said
     )
 
