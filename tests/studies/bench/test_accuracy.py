@@ -2,7 +2,9 @@
 
 import pytest
 
-from gbm_plugin.studies.accuracy import front, integrators
+from gbm_plugin.case.beads import bead_error
+from gbm_plugin.scales import coupling_error, coupling_step
+from gbm_plugin.studies.accuracy import front, integrators, sampling
 
 
 def test_front():
@@ -23,3 +25,22 @@ def test_ab3_and_extrapolation_are_of_third_order(monkeypatch):
     errors = [row["error"] for row in rows if row["integrator"] == "ab3"]
     assert errors[0] / errors[1] == pytest.approx(2**3, rel=0.25)
     assert all(row["microseconds"] > 0 for row in rows)
+
+
+def test_interpolation_against_the_fourier_sum():
+    """`exact` is the sum of the modes to rounding, and every further node pays."""
+    modes = sampling.random_modes(sampling.spectrum(), seed=1)
+    fibers = sampling.Carrier("frozen", None, 2.0, 0.01, 0.45, 1.0).fibers(0.4, 4, 8)
+    truth = sampling.exact(modes, fibers.positions.reshape(-1, 3))
+    rows = sampling._spectral(modes, fibers, 40, truth)
+    errors = {row["word"]: row["velocity_error"] for row in rows}
+    assert errors["exact"] < 1e-12
+    assert errors["trilinear"] > 3 * errors["cubic"] > 6 * errors["quintic"]
+    assert [row["rotation_error"] < 1e-12 for row in rows] == [False, False, False, True]
+
+
+def test_rule_of_beads_and_of_the_step():
+    """What the page says of them: 1 % after two τ, 1e-3 a Kolmogorov time."""
+    assert bead_error(20, 1 / 0.15) == pytest.approx(7.5e-3)
+    assert coupling_step(1e-3, 1.0) == pytest.approx(0.2714, abs=1e-4)
+    assert coupling_error(coupling_step(1e-4, 2.0), 2.0) == pytest.approx(1e-4)
