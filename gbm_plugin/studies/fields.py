@@ -49,10 +49,10 @@ class Field:
         weights = lagrange_weights(times[part], self.time)
         return np.tensordot(weights, self.finished.recording.families[family.name].positions[part], 1)
 
-    def enstrophy_and_strain(self) -> tuple[float, float]:
-        """<ω²> and <S²> = <S_ij S_ij> over the box [1/s²]: ω² = 2 S² in homogeneous turbulence."""
-        square = self.dissipation / self.finished.flow.viscosity
-        return square, square / 2
+    def at_random(self, count: int, seed: int = 1) -> NDArray:
+        """Gradients (count, 3, 3) at random places of the box: what tracers see, by the same interpolation."""
+        places = np.random.default_rng(seed).uniform(0, 1, (count, 3))
+        return self.gradient(self.origin + places * self.box)
 
 
 def fields_of(finished: FinishedRun, most: int) -> Iterator[Field]:

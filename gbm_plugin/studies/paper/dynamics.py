@@ -4,7 +4,8 @@ Per family: integral times of the end-to-end vector and of the mean curvature; �
 which straight fibers buckle (R/L falls below 0.8, per unit of the time spent above it); share of the time in which a
 fiber touches itself, beads at least three links apart nearer than 2a, and in which it is folded over one bead (two
 links apart). At the velocity fields that the run stored: cos² between the end-to-end vector and the vorticity and the
-strain's axes at the centre, and the mean ω² and S² at the beads over those of the box, where tracers have 1.
+strain's axes at the centre, and the mean ω² and S² at the beads over those at random places, where
+tracers have 1.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from ..study import compact, option, steps
 
 STRAIGHT = 0.8  # R/L, the paper's limit of buckling
 SHOWN = 200.0  # L/l_p, beyond which a family is not drawn
+TRACERS = 200_000  # random places, of which the box's means are those
 LAGS = 60  # kept of a correlation
 MARKERS = "osD^vP*X"
 
@@ -139,7 +141,7 @@ def _sampled(finished: FinishedRun, states: int) -> tuple[dict[str, dict], int]:
     taken = 0
     for field in fields_of(finished, states):
         taken += 1
-        enstrophy, strain = field.enstrophy_and_strain()
+        enstrophy, strain = (float(part.mean()) for part in _squares(field.at_random(TRACERS)))
         for family in finished.families:
             x = field.positions(family)
             part = _at_beads(field.gradient, x, enstrophy, strain)
@@ -159,15 +161,18 @@ def _sampled(finished: FinishedRun, states: int) -> tuple[dict[str, dict], int]:
 
 def _at_beads(gradient: Callable, positions: NDArray, enstrophy: float, strain: float) -> dict[str, NDArray]:
     """Means over the beads of each fiber (F,)."""
-    g = gradient(positions)
-    omega2 = (vorticity(g) ** 2).sum(axis=-1)
-    symmetric = (g + g.swapaxes(-1, -2)) / 2
-    s2 = (symmetric**2).sum(axis=(-1, -2))
+    omega2, s2 = _squares(gradient(positions))
     return {
         "enstrophy_over_box": (omega2 / enstrophy).mean(axis=-1),
         "strain_over_box": (s2 / strain).mean(axis=-1),
         "in_vortices": (omega2 > 2 * s2).mean(axis=-1),
     }
+
+
+def _squares(gradient: NDArray) -> tuple[NDArray, NDArray]:
+    """ω² and S_ij S_ij (...) [1/s²]."""
+    symmetric = (gradient + gradient.swapaxes(-1, -2)) / 2
+    return (vorticity(gradient) ** 2).sum(axis=-1), (symmetric**2).sum(axis=(-1, -2))
 
 
 def rows(result: dict) -> list[dict]:

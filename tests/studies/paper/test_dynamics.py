@@ -78,7 +78,9 @@ def test_contact(found):
 def test_memory_and_tumbling(found):
     rows, curves = found
     curve = curves["turning"]
-    np.testing.assert_allclose(curve["R"], np.cos(RATE * TAU * np.array(curve["lag_over_tau"])), atol=1e-12)
+    np.testing.assert_allclose(
+        curve["R"], np.cos(RATE * TAU * np.array(curve["lag_over_tau"])), atol=4e-4
+    )  # five digits of lags
     assert rows["turning"]["time_of_R_over_tau"] == pytest.approx(1 / RATE / TAU, rel=0.01)
     assert rows["turning"]["tumbling"] == pytest.approx((RATE * TAU) ** 2, rel=1e-9)
     assert np.abs(curves["scattered"]["R"][1:]).max() < 5 / np.sqrt(COUNT * 100)
