@@ -187,6 +187,10 @@ def notes(scene: Scene, judged: bool = True) -> list[str]:
             f"OpenFOAM writes every {scene.write_interval:g} s and not at endTime {scene.end_time:g}: the same command "
             "will repeat what follows the last time that is written"
         )
+    if scene.statistics is not None and scene.statistics.since > scene.end_time:
+        found.append(
+            f"statistics begin at {scene.statistics.since:g} s, after endTime {scene.end_time:g}: none are gathered"
+        )
     model = _turbulence_model(scene.case)
     if model not in ("laminar", None):
         found.append(

@@ -160,6 +160,14 @@ def test_worth_a_word(case):
     assert "note: fibers of family test" in gbm("info", case).stdout
 
 
+def test_statistics_that_begin_after_the_end(case):
+    fibers = case / "constant/fiberProperties"
+    text = fibers.read_text()
+    for begin, said in (("0.2", 0), ("3", 1)):
+        fibers.write_text(text + f"statistics {{ from {begin}; }}\n")
+        assert sum("none are gathered" in note for note in notes(read_scene(case))) == said
+
+
 @pytest.mark.parametrize("interval, said", [("10", False), ("7", True), ("1000", True)])
 def test_an_end_that_is_not_written(interval, said, case):
     set_entry(case / CONTROL, "writeInterval", interval)  # of 20 steps

@@ -84,7 +84,7 @@ def _cases() -> list[Case]:
                 lambda a=application, c=courant: ran(a, c), refused, openfoam=True,
             ))  # fmt: skip
         cases += [
-            Case("OpenFOAM's flow", f"k_max η = 0.5, {application}",
+            Case("OpenFOAM's flow", f"k_max η = 0.1, {application}",
                  lambda a=application: ran(a, 0.2, 40, viscosity=0.0023), openfoam=True),
             Case("forcing", f"constant power, fluid in uniform motion, {application}",
                  lambda a=application: ran(a, 0.2, 5, initial=NOTHING.format(0.5)), "nothing to force", openfoam=True),
