@@ -104,13 +104,15 @@ def describe(result: dict) -> str:
         "",
         f"{'computes':<{WIDTH - WHY + 1}}asked for by",
     ]
-    items, first = result["computes"], len(result["families"])
-    shown = items[: len(items) - first - 1] + items[-first - 1 : -1][:FAMILIES]
-    for item in shown:
+    families = len(result["families"])
+    *before, sampling = result[
+        "computes"
+    ]  # the flow and its forcing, the families, and what is sampled for them
+    for item in before[: len(before) - max(0, families - FAMILIES)]:
         lines += _row(**item)
-    if first > FAMILIES:
-        lines += _row("", f"and {first - FAMILIES} more families", "")
-    lines += _row(**items[-1])
+    if families > FAMILIES:
+        lines += _row("", f"and {families - FAMILIES} more families", "")
+    lines += _row(**sampling)
     if result["left_out"]:
         lines += textwrap.wrap(f"not, as nothing asks: {', '.join(result['left_out'])}", WIDTH - 2,
                                initial_indent="  ", subsequent_indent="    ")  # fmt: skip

@@ -14,38 +14,17 @@ SECOND = {"central2": (1.0,), "central4": (4 / 3, -1 / 12), "central6": (3 / 2, 
 
 
 def scheme(scene: Scene) -> str:
-    """The solver's order, in few words."""
-    if scene.application != "boxFoam":
-        return "finite volumes, by fvSchemes and fvSolution"
-    box = Dictionary.read(scene.case, "system/fvSchemes").sub("boxSchemes", {})
-    order, _ = DIFFERENCES[box.word("differences", DIFFERENCES, "central6")]
-    return f"{order} order in space, third in time"
+    """What the case's solver does, in few words. CaseError for differences that boxFoam does not have."""
+    if scene.application == "boxFoam":
+        order, _ = DIFFERENCES[_differences(scene.case)]
+        return f"{order} order in space, third in time"
+    text = "finite volumes, by fvSchemes and fvSolution"
+    return f"{text}; boxFoam solves this box far faster" if scene.box and scene.cells else text
 
 
 def stable_courant(scene: Scene) -> float | None:
-    """The Courant number up to which the solver is stable; None where it is implicit."""
-    if scene.application != "boxFoam":
-        return None
-    box = Dictionary.read(scene.case, "system/fvSchemes").sub("boxSchemes", {})
-    return DIFFERENCES[box.word("differences", DIFFERENCES, "central6")][1]
-
-
-def meaning(scene: Scene) -> str:
-    """One line about the case's solver. CaseError for differences that boxFoam does not have."""
-    if scene.application != "boxFoam":
-        text = f"{scene.application}, finite volumes by system/fvSchemes and fvSolution, on any mesh"
-        uniform = scene.box and scene.cells
-        return (
-            f"{text}; boxFoam solves this box of equal cells far faster (docs/boxfoam.md)"
-            if uniform
-            else text
-        )
-    order, courant = DIFFERENCES[_differences(scene.case)]
-    text = f"boxFoam, {order} order in space, third in time, conserving momentum and energy"
-    if not (scene.box and scene.cells):
-        return text
-    fastest = courant * min(b / n for b, n in zip(scene.box, scene.cells, strict=True)) / scene.time_step
-    return f"{text}; stable while |u_x| + |u_y| + |u_z| is below {fastest:.3g} m/s"
+    """The Courant number sum |u_d| dt/h_d up to which the solver is stable; None where it is implicit."""
+    return DIFFERENCES[_differences(scene.case)][1] if scene.application == "boxFoam" else None
 
 
 def second_difference(case: Path) -> tuple[float, ...]:
