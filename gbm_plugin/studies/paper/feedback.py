@@ -213,17 +213,26 @@ def draw(result: dict) -> Figure:
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
     none = np.array(result["runs"][0]["spectrum"])[:, 0]
+    densities = sorted({r["count"] for r in result["runs"]})
     for r in result["runs"]:
-        k = np.array(r["wavenumbers"]) * r["scene"]["eta"]
-        e, x = np.array(r["spectrum"]), np.array(r["exchange_spectrum"])
-        some = (k > 0) & (none > 0) & (np.array(r["wavenumbers"]) <= (r["scene"]["cells"] - 1) // 3)
-        label = f"{r['name']}, {r['volume_fraction']:.1e}" if r["count"] else "none"
-        style = {"rods": "-", "flexible": "--"}.get(r["name"], ":")
-        left.errorbar(k[some], e[some, 0] / none[some], e[some, 1] / none[some], fmt=style, label=label)
+        k = np.array(r["wavenumbers"])
+        some = (k > 0) & (none > 0) & (k <= (r["scene"]["cells"] - 1) // 3)
+        k, e, x = (
+            k[some] * r["scene"]["eta"],
+            np.array(r["spectrum"])[some],
+            np.array(r["exchange_spectrum"])[some],
+        )
+        style = {
+            "fmt": {"rods": "o-", "flexible": "s--"}.get(r["name"], ":"),
+            "markersize": 3,
+            "color": f"C{densities.index(r['count'])}" if r["count"] else "0.3",
+            "label": f"{r['name']}, φ = {r['volume_fraction']:.1e}" if r["count"] else "none",
+        }
+        left.errorbar(k, e[:, 0] / none[some], e[:, 1] / none[some], **style)
         if r["count"]:
-            right.errorbar(k[some], k[some] * x[some, 0], k[some] * x[some, 1], fmt=style, label=label)
-    left.set(xlabel="kη", ylabel="E(k) over that without fibers", xscale="log")
-    right.set(xlabel="kη", ylabel="kη times power given to the flow", xscale="log")
+            right.errorbar(k, 1e3 * x[:, 0], 1e3 * x[:, 1], **style)
+    left.set(xlabel="kη", ylabel="E(k) over that without fibers")
+    right.set(xlabel="kη", ylabel="power given to a shell, 10⁻³ m³/s³")
     right.axhline(0, color="0.7", linewidth=0.8)
     left.legend(fontsize="small")
     return figure
