@@ -1,14 +1,13 @@
-"""Whether beads that act on the flow can be points in it: numbers of a scene with feedback, and what is refused."""
+"""Whether beads that act on the flow can be points in it: numbers of a scene with feedback, and what is refused.
+
+A Scene and its Family, which `scene` has, go without a type here: it asks this module, and no import runs in a circle.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from ..errors import CaseError
-
-if TYPE_CHECKING:
-    from .scene import Family, Scene
 
 NEGLIGIBLE, TOO_LARGE = (
     0.05,
@@ -17,7 +16,7 @@ NEGLIGIBLE, TOO_LARGE = (
 STABLE = 2.0  # largest exchange_step seen to be stable; at 3 it was not (docs/results/feedback.md)
 
 
-def cell_size(scene: Scene) -> float | None:
+def cell_size(scene) -> float | None:
     """Cube root of the volume of a cell; None where the mesh is not known."""
     if scene.box is None or scene.cells is None:
         return None
@@ -29,7 +28,7 @@ def own_ratio(radius: float, cell: float) -> float:
     return radius / (math.sqrt(math.pi) * cell)
 
 
-def removes_own(scene: Scene, family: Family) -> bool:
+def removes_own(scene, family) -> bool:
     """Whether the own disturbance of a family's beads is taken out of what they sample."""
     choice, cell = scene.coupling.own_disturbance, cell_size(scene)
     if not scene.coupling.feedback or choice == "kept" or cell is None:
@@ -37,7 +36,7 @@ def removes_own(scene: Scene, family: Family) -> bool:
     return choice == "removed" or own_ratio(family.radius, cell) > NEGLIGIBLE
 
 
-def exchange_step(scene: Scene) -> float:
+def exchange_step(scene) -> float:
     """6πνa n Δt of all beads, n of them in a volume: what the flow loses in a step to beads that do not follow it."""
     if scene.box is None:
         return 0.0
@@ -45,7 +44,7 @@ def exchange_step(scene: Scene) -> float:
     return 6 * math.pi * scene.kinematic_viscosity * scene.time_step * sizes / math.prod(scene.box)
 
 
-def reaction(f: Family, scene: Scene) -> dict[str, float | str]:
+def reaction(f, scene) -> dict[str, float | str]:
     """What fibers that act on the flow are to it; of a scene whose box is known."""
     density = f.total / math.prod(scene.box or ())
     result: dict[str, float | str] = {
@@ -60,7 +59,7 @@ def reaction(f: Family, scene: Scene) -> dict[str, float | str]:
     return result
 
 
-def check_feedback(scene: Scene) -> None:
+def check_feedback(scene) -> None:
     """CaseError for beads too large for their cells, and for more of them than an explicit exchange bears."""
     if not scene.coupling.feedback:
         return
