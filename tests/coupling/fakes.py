@@ -31,12 +31,13 @@ from gbm_plugin.coupling.message import (
     encode_welcome,
 )
 
-from conftest import start_solver
+from conftest import solver_log, start_solver
 
 BOX = 2 * np.pi
 FAMILIES = [(12, 6, 0)]  # of conftest.FAMILY
 PATIENCE = 300  # s, for what must happen; how long it takes is nobody's fault
 ADDRESSES = {"socket": "gbm.sock", "tcp": "gbm.tcp", "file": "exchange/session"}
+SOLVERS = ("boxFoam", "pimpleFoam")
 
 
 def start_gbm(*arguments, **options) -> subprocess.Popen:
@@ -230,11 +231,11 @@ def _header(data: bytes):
 
 
 def fake_daemon(case: Path, misbehave: Callable) -> str:
-    """pimpleFoam against a daemon that is fine until it calls misbehave(channel, first, beads) in place of sending
-    the positions of step 1. Returns the one line that pimpleFoam ends with."""
+    """The case's solver against a daemon that is fine until it calls misbehave(channel, first, beads) in place of
+    sending the positions of step 1. Returns the one line that it ends with."""
     scene = read_scene(case)
     beads = sum(f.count * f.beads for f in scene.families)
-    with listen(case, scene.coupling, case / "log.pimpleFoam") as listener:
+    with listen(case, scene.coupling, solver_log(case)) as listener:
         solver = start_solver(case)
         try:
             channel, first, _ = listener.greet(lambda: solver.poll() is not None)
@@ -244,7 +245,7 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
         finally:
             solver.kill()
             solver.wait()
-    text = fatal_message(case / "log.pimpleFoam")
+    text = fatal_message(solver_log(case))
     assert text is not None
     return text
 
@@ -284,14 +285,14 @@ def children(pid: int) -> dict[str, int]:
             continue
         if "daemon" in words:
             found["daemon"] = int(child)
-        elif words[0] in ("pimpleFoam", "mpirun"):
+        elif words[0] in (*SOLVERS, "mpirun"):
             found["solver"] = int(child)
     return found
 
 
 def is_solver(pid: int) -> bool:
     try:
-        return Path(f"/proc/{pid}/comm").read_text().strip() == "pimpleFoam"
+        return Path(f"/proc/{pid}/comm").read_text().strip() in SOLVERS
     except OSError:
         return False
 

@@ -14,7 +14,7 @@ from gbm_plugin.coupling.message import (
     encode_welcome,
 )
 
-from conftest import set_families, start_solver
+from conftest import set_families, solver_log, start_solver
 
 
 def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
@@ -27,9 +27,9 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
     samples = {}
     solver = start_solver(case, ranks)
     try:
-        with listen(case, scene.coupling, case / "log.pimpleFoam") as listener:
+        with listen(case, scene.coupling, solver_log(case)) as listener:
             greeted = listener.greet(lambda: solver.poll() is not None)
-            assert greeted is not None, (case / "log.pimpleFoam").read_text()[-3000:]
+            assert greeted is not None, solver_log(case).read_text()[-3000:]
             channel, first, hello = greeted
             channel.send(
                 Message(
@@ -52,7 +52,7 @@ def probe(case, positions: np.ndarray, need: str = "rotation", ranks: int = 1):
                 samples[step] = (message.time, *decode_sample(message, len(positions), need))
                 step += 1
             channel.close()
-        assert solver.wait() == 0, (case / "log.pimpleFoam").read_text()[-3000:]
+        assert solver.wait() == 0, solver_log(case).read_text()[-3000:]
     finally:
         solver.kill()
     return hello, samples

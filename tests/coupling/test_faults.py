@@ -20,7 +20,7 @@ from gbm_plugin.coupling.message import Kind, Message
 from gbm_plugin.output.recording import open_recording
 from gbm_plugin.run.standstill import members
 
-from conftest import divide, gbm, make_case, set_entry, start_solver
+from conftest import divide, gbm, make_case, set_entry, solver_log, start_solver
 from fakes import (
     FakeSolver,
     Run,
@@ -46,7 +46,7 @@ NAN = float("nan")
 @pytest.fixture(scope="module")
 def original(tmp_path_factory):
     """To be copied."""
-    return make_case(tmp_path_factory.mktemp("original") / "case", timeout=PATIENT, tight=False)
+    return make_case(tmp_path_factory.mktemp("original") / "case", timeout=PATIENT, application="boxFoam")
 
 
 @pytest.fixture
@@ -210,7 +210,7 @@ def test_daemon_with_a_solver_that_is(transport, fault, copy):
             assert expected in solver.last_word()
             solver.close()
         line = one_line(solver.daemon, "daemon")
-    assert expected in line and str(prepared / "log.pimpleFoam") in line
+    assert expected in line and str(solver_log(prepared)) in line
     taken = fault in ("duplicated", "foreign folder", "save of another step")
     assert records(prepared) == (5 if taken else 4)
     assert not solver.address.exists()
@@ -233,7 +233,7 @@ def test_daemon_with_a_solver_on_another_case(change, expected, prepared):
         assert expected in solver.last_word()
         solver.close()
         line = one_line(solver.daemon, "daemon")
-    assert expected in line and "log.pimpleFoam" in line
+    assert expected in line and "log.boxFoam" in line
 
 
 @pytest.mark.parametrize("transport", ["socket", "tcp"])
@@ -251,7 +251,7 @@ def test_daemon_with_a_solver_that_goes_on_after_its_end(transport, copy):
     assert records(prepared) == 4
 
 
-# --- a daemon that misbehaves, against the real pimpleFoam --------------------------------------------------
+# --- a daemon that misbehaves, against the real boxFoam --------------------------------------------------
 
 
 def _after_greeting(make):
@@ -425,7 +425,7 @@ DAEMON_FAULTS_ELSEWHERE = (
     [("socket", fault) for fault in DAEMON_FAULTS]
     + [(transport, fault) for transport in ("tcp", "file") for fault in DAEMON_FAULTS_ELSEWHERE],
 )
-def test_pimplefoam_with_a_daemon_that_is(transport, fault, copy):
+def test_solver_with_a_daemon_that_is(transport, fault, copy):
     prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT)
     misbehave, expected = DAEMON_FAULTS[fault]
     if transport == "file" and fault == "truncated":
@@ -435,14 +435,14 @@ def test_pimplefoam_with_a_daemon_that_is(transport, fault, copy):
     assert "daemon on" in line and f"its log: {prepared}/log.gbmDaemon" in line
 
 
-def test_pimplefoam_without_a_daemon(copy):
+def test_solver_without_a_daemon(copy):
     """It waits for one as long as it is told."""
     prepared = copy(timeout=IMPATIENT)
     began = time.monotonic()
     solver = start_solver(prepared)
     assert solver.wait() == 1
     assert time.monotonic() - began > IMPATIENT
-    line = fatal_message(prepared / "log.pimpleFoam")
+    line = fatal_message(solver_log(prepared))
     assert "no daemon answers: No such file or directory; start it with 'gbm daemon" in line
     assert "log.gbmDaemon" in line
 
@@ -521,14 +521,14 @@ def test_second_solver_is_told_so(prepared):
         solver.serve_until(4)
         second = start_solver(prepared)
         assert second.wait() == 1
-        text = fatal_message(prepared / "log.pimpleFoam")
+        text = fatal_message(solver_log(prepared))
         assert "another solver is connected to this daemon: two runs in one case?" in text
         solver.raw(solver.sample(4).encode())
         solver.serve_until(6)  # unharmed
 
 
 def test_strangers_on_tcp_are_refused_and_the_run_goes_on(tmp_path):
-    case = make_case(tmp_path / "case", transport="tcp", tight=False)
+    case = make_case(tmp_path / "case", transport="tcp", application="boxFoam")
     with FakeSolver(case) as solver:
         for token in ("", "0" * 32):
             solver.connect(token=token)
@@ -550,7 +550,7 @@ def test_strangers_on_tcp_are_refused_and_the_run_goes_on(tmp_path):
 
 def test_stale_files_and_the_session_of_a_killed_daemon(tmp_path):
     """A solver that finds the session of a killed daemon is served by the next one, which clears the rest."""
-    case = make_case(tmp_path / "case", transport="file", tight=False)
+    case = make_case(tmp_path / "case", transport="file", application="boxFoam")
     killed = start_gbm("daemon", case)
     session = until(
         lambda: (case / "exchange/session").exists() and (case / "exchange/session").read_text(), "it"
@@ -564,7 +564,7 @@ def test_stale_files_and_the_session_of_a_killed_daemon(tmp_path):
     hello = case / f"exchange/{session.strip()}.flow.0"
     until(lambda: hello.read_bytes() != b"stale", "a HELLO to nobody")
     daemon = start_gbm("daemon", case)
-    assert solver.wait() == 0, (case / "log.pimpleFoam").read_text()[-2000:]
+    assert solver.wait() == 0, solver_log(case).read_text()[-2000:]
     output, _ = daemon.communicate()
     assert daemon.returncode == 0, output
     assert records(case) == 21
@@ -572,7 +572,9 @@ def test_stale_files_and_the_session_of_a_killed_daemon(tmp_path):
 
 
 def test_case_path_longer_than_a_socket_address(tmp_path):
-    case = make_case(tmp_path / ("long" * 20) / ("path" * 20) / "case", steps=3, write_every=3)
+    case = make_case(
+        tmp_path / ("long" * 20) / ("path" * 20) / "case", steps=3, write_every=3, application="boxFoam"
+    )
     assert len(str(case / "gbm.sock")) > 200
     done = gbm("run", case)
     assert done.returncode == 0, done.stderr
@@ -602,15 +604,15 @@ def test_of_a_run(victim, harm, long_case, silence):
     both = run.at_step(12)
     os.kill(both[victim], harm)
     line = run.line()
-    other = {"daemon": "pimpleFoam", "solver": "gbmDaemon"}[victim]
+    other = {"daemon": "boxFoam", "solver": "gbmDaemon"}[victim]
     if harm is signal.SIGKILL:
-        assert {"daemon": "the daemon", "solver": "pimpleFoam"}[victim] + " was ended by SIGKILL" in line
+        assert {"daemon": "the daemon", "solver": "boxFoam"}[victim] + " was ended by SIGKILL" in line
     else:
         assert {"daemon": "the daemon", "solver": "OpenFOAM"}[
             victim
         ] + f" was silent for {silence:g} s" in line
         assert f"log.{other}" in line
-    assert {"daemon": "log.gbmDaemon", "solver": "log.pimpleFoam"}[victim] in line
+    assert {"daemon": "log.gbmDaemon", "solver": "log.boxFoam"}[victim] in line
     assert not any(os.path.exists(f"/proc/{pid}") for pid in both.values())
     assert records(long_case) >= 12
     _continues(long_case, 12)
@@ -619,7 +621,7 @@ def test_of_a_run(victim, harm, long_case, silence):
 def test_run_that_hangs_before_its_first_step(long_case, silence):
     """Nobody waits for anybody with a timeout yet: `gbm run` itself ends it and says where it stood."""
     set_coupling(long_case, "socket", silence)
-    divide(long_case, 3, (1, 3, 1))
+    divide(long_case, 3, (1, 1, 3))
     run = Run(long_case, "--parallel")
     until(lambda: "solver" in children(run.process.pid), "the solver's start")
     solver = children(run.process.pid)["solver"]
@@ -627,7 +629,7 @@ def test_run_that_hangs_before_its_first_step(long_case, silence):
     os.kill(victim, signal.SIGSTOP)
     line = run.line()
     assert f"no step for {silence + 5:g} s" in line
-    assert f"pimpleFoam was stopped by a signal (process {victim}; {long_case}/log.pimpleFoam)" in line
+    assert f"boxFoam was stopped by a signal (process {victim}; {long_case}/log.boxFoam)" in line
     assert "the daemon said last 'waiting for OpenFOAM (socket)'" in line
     assert not list(members(solver))
 

@@ -17,7 +17,7 @@ import pytest
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.coupling.message import HEADER_SIZE, NONCE_SIZE, Kind, Message
 
-from conftest import make_case, start_solver
+from conftest import make_case, solver_log, start_solver
 from fakes import PATIENCE, FakeSolver, start_gbm, until, welcome
 
 pytestmark = pytest.mark.openfoam
@@ -28,7 +28,7 @@ LONG = 300.0  # s: a timeout that nothing here needs
 @pytest.fixture(scope="module")
 def prepared(tmp_path_factory):
     return make_case(
-        tmp_path_factory.mktemp("tcp") / "case", steps=3, transport="tcp", timeout=LONG, tight=False
+        tmp_path_factory.mktemp("tcp") / "case", steps=3, transport="tcp", timeout=LONG, application="boxFoam"
     )
 
 
@@ -52,7 +52,7 @@ def address(case: Path) -> tuple[tuple[str, int], str]:
 
 
 def ends_well(case: Path, solver, daemon) -> str:
-    assert solver.wait() == 0, (case / "log.pimpleFoam").read_text()[-2000:]
+    assert solver.wait() == 0, solver_log(case).read_text()[-2000:]
     output, _ = daemon.communicate()
     assert daemon.returncode == 0, output
     return output
@@ -111,7 +111,7 @@ def rogue(tcp_case):
             solver.kill()
             solver.wait()
         assert token.encode() not in said if mode == 0o600 else True
-        return fatal_message(tcp_case / "log.pimpleFoam")
+        return fatal_message(solver_log(tcp_case))
 
     with server:
         yield answer
@@ -209,7 +209,7 @@ def test_a_queue_that_is_full_does_not_hold_the_solver(tcp_case):
         solver = start_solver(tcp_case)
         stack.callback(solver.kill)
         assert solver.wait() == 1
-    line = fatal_message(tcp_case / "log.pimpleFoam")
+    line = fatal_message(solver_log(tcp_case))
     assert "no daemon answers: 127.0.0.1 port" in line and "Connection timed out" in line
 
 
@@ -236,7 +236,7 @@ def file_case(prepared, tmp_path):
 
 def refused(case: Path) -> str:
     assert start_solver(case).wait() == 1
-    return fatal_message(case / "log.pimpleFoam")
+    return fatal_message(solver_log(case))
 
 
 def test_exchange_that_is_not_ones_own(file_case):

@@ -102,11 +102,11 @@ SETTINGS |= {
     }.items()
 }
 
-# the clock of OpenFOAM's profiling is std::chrono's, here replaced by that of the process
+# one of std::chrono's clocks, that of OpenFOAM's profiling or of the coupling's table, replaced by that of the process
 PROCESS_CLOCK = """
 #include <chrono>
 #include <ctime>
-std::chrono::system_clock::time_point std::chrono::system_clock::now() noexcept
+std::chrono::CLOCK::time_point std::chrono::CLOCK::now() noexcept
 {
     timespec t;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -156,10 +156,10 @@ def totals(profile: Path) -> dict[str, float]:
     return {"step": step, **parts, "rest": step - sum(parts.values())}
 
 
-def process_clock(folder: Path) -> Path:
+def process_clock(folder: Path, clock: str = "system_clock") -> Path:
     """A library to be loaded before all others."""
     source = folder / "clock.cpp"
-    source.write_text(PROCESS_CLOCK)
+    source.write_text(PROCESS_CLOCK.replace("chrono::CLOCK", f"chrono::{clock}"))
     library = folder / "libclock.so"
     subprocess.run(["g++", "-O2", "-shared", "-fPIC", source, "-o", library], check=True)
     return library

@@ -21,11 +21,20 @@ INLINE void sampleAll
     const vector perCell(cells.box().perCell());
     const label n = 3 + components(wanted);
 
-    forAll(beads.points(), i)
+    const UList<point>& points = beads.points();
+    vector next;
+    label nextSlot = points.size() ? cells.around(points[0], next) : 0;
+
+    forAll(points, i)
     {
         scalar* out = values.begin() + n*beads.placeOf(i);
-        vector x;
-        u.slot = cells.around(beads.points()[i], x);
+        const vector x(next);
+        u.slot = nextSlot;
+        if (i + 1 < points.size())
+        {
+            nextSlot = cells.around(points[i + 1], next);
+            interpolant.fetch(u, nextSlot);
+        }
 
         vector d[3];
         const vector velocity
