@@ -23,6 +23,7 @@ log = logging.getLogger(__name__)
 
 WRITTEN = (RESULTS, PREVIOUS, "report", "spectral", "stored", "exchange*", "processor[0-9]*")  # and times
 READ = ("constant", "system", "0.orig")  # may be links: to a mesh or dictionaries that cases share
+RESULTS_FOLDERS = ("spectral", "stored")
 NAMED = 3  # so many of the files of other owners are named
 
 
@@ -40,11 +41,18 @@ def check_case(case: Path) -> None:
 def refuse_links_out(case: Path, part: Path) -> None:
     """CaseError where a file or folder of the case, or one in it, is a link to a place that is not in the case."""
     for link in _links(part):
-        of_results = link.name in READ and link.parent.parent == case  # spectral/constant, which is only read
-        if not of_results and not is_inside(case, link):
+        if not _of_results(case, link) and not is_inside(case, link):
             raise CaseError(
                 f"{link} is a link to {os.path.realpath(link)}, out of the case, and a run would write there: remove it"
             )
+
+
+def _of_results(case: Path, link: Path) -> bool:
+    """Of results in a folder of the case what is only read: spectral/constant, or beside its own mesh what is in it."""
+    inner = link.parent.name == "constant" and link.parent.parent.name in RESULTS_FOLDERS
+    if inner and link.parent.parent.parent == case:
+        return link.name != "polyMesh"
+    return link.name in READ and link.parent.parent == case
 
 
 def is_inside(case: Path, path: Path) -> bool:

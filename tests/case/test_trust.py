@@ -17,6 +17,7 @@ from gbm_plugin.coupling.listen import listen
 from gbm_plugin.errors import CaseError, CouplingError, LockedError
 from gbm_plugin.output.recording import open_recording
 from gbm_plugin.report.report import report
+from gbm_plugin.run.driver import results_folder
 from gbm_plugin.run.openfoam import run
 
 from conftest import make_case, run_case
@@ -108,6 +109,21 @@ def test_links_within_the_case_and_of_what_is_read(tmp_path):
     (case / "spectral/constant").symlink_to("../constant")
     (case / "Allrun").symlink_to(base / "Allrun")
     check_case(case)
+    results_folder(case, "stored")  # with a mesh of its own beside links to what is only read
+    assert (case / "stored/constant/polyMesh/points").is_file()
+    assert (case / "stored/constant/fiberProperties").is_symlink()
+    check_case(case)
+
+
+@pytest.mark.parametrize(
+    "place", ["spectral/constant/polyMesh", "postProcessing/constant/0", "0.1/constant/x"]
+)
+def test_links_out_that_only_look_like_those(place, home, tmp_path):
+    case = make_case(tmp_path / "case", prepared=False)
+    (case / place).parent.mkdir(parents=True)
+    (case / place).symlink_to(home)
+    with pytest.raises(CaseError, match=f"{place} is a link to {home}, out of the case"):
+        check_case(case)
 
 
 def test_secrets_are_not_copied_into_the_recording(tmp_path):
