@@ -1,9 +1,8 @@
-"""Fibers that act on OpenFOAM's flow: energy and momentum, ranks and daemons, restarts, and the other engine."""
+"""Fibers that act on OpenFOAM's flow: energy and momentum, ranks and daemons, restarts."""
 
 from __future__ import annotations
 
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -121,20 +120,3 @@ def test_a_stopped_run_continues_to_the_same_bits(whole, tmp_path):
     np.testing.assert_array_equal(
         read_velocity(other, "0.4", (16, 16, 16)), read_velocity(path, "0.4", (16, 16, 16))
     )
-
-
-def test_both_engines_converge_in_cells(tmp_path):
-    """Energy and exchange of boxFoam and the spectral solver after ten steps, by the second order of trilinear
-    sampling; the fibers are long, so that what they feel is resolved."""
-    gaps = []
-    for cells in (16, 32):
-        path = coupled(tmp_path / f"{cells}", cells=cells, steps=10, write_every=100, tight=False)
-        run_case(path)
-        run_case(path, "--flow", "spectral")
-        (flow, _), (other, _) = tables(path), tables(path, "spectral")
-        gaps.append([flow[c][-1] / other[c][-1] - 1 for c in ("k", "exchange")])
-        shutil.rmtree(path)
-    gaps = np.abs(gaps)
-    assert gaps[-1, 0] < 1e-3 and gaps[-1, 1] < 0.03
-    orders = np.log(gaps[0] / gaps[-1]) / np.log(2)
-    assert (orders > 1.6).all(), gaps
