@@ -73,7 +73,8 @@ class Group:
     def reaction(self, time_step: float) -> Reaction:
         """Forces and torques (B, 3) on the fluid at the newest sample, and the powers of all; as that of Stepper."""
         parts = [s.reaction(time_step) for s in self.steppers]
-        force, torque = (np.concatenate([p[k].reshape(-1, 3) for p in parts]) for k in (0, 1))
+        force = np.concatenate([p.force.reshape(-1, 3) for p in parts])
+        torque = np.concatenate([p.torque.reshape(-1, 3) for p in parts])
         return Reaction(force, torque, sum(p.bending for p in parts), sum(p.friction for p in parts))
 
     def advance(self, time_step: float) -> None:

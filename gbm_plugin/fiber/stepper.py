@@ -118,7 +118,7 @@ class Stepper:
         along = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
         return along + (drift - along.mean(axis=1))[:, None]
 
-    def _instant(self):
+    def _instant(self) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
         """Links, their rates and that of the centre, and contact forces, as of instant_rates."""
         if not self.samples or self.sampled_until != self.time:
             raise ValueError(f"no sample of the flow at time {self.time:g}: observe() comes before")

@@ -65,18 +65,18 @@ class TaylorGreen:
         wavenumber = np.pi / self.width
         velocity, slopes = np.empty(points.shape), np.empty((len(points), 2))
         in_shares(_cellular, COST * len(points), points, wavenumber, self.velocity, velocity, slopes)
-        velocity, rate = velocity.reshape(shape), self.velocity * wavenumber
+        result, rate = velocity.reshape(shape), self.velocity * wavenumber
         if one_of("need", need, NEEDS) == "velocity":
-            return velocity, None
+            return result, None
         sines, cosines = slopes[:, 0].reshape(shape[:-1]), slopes[:, 1].reshape(shape[:-1])
         if need == "rotation":
             rotation = np.zeros(shape)
             np.multiply(rate, sines, out=rotation[..., 2])
-            return velocity, rotation
+            return result, rotation
         gradient = np.zeros((*shape, 3))
         gradient[..., 0, 0], gradient[..., 0, 1] = rate * cosines, -rate * sines
         gradient[..., 1, 0], gradient[..., 1, 1] = rate * sines, -rate * cosines
-        return velocity, gradient
+        return result, gradient
 
 
 @kernel
