@@ -31,7 +31,7 @@ class Ambient:
     def __init__(self, fibers: int, beads: int):
         self.shape = (fibers, beads)
         self.times: list[float] = []
-        self.samples: list[tuple[np.ndarray, ...]] = []  # each (velocity, rotation) in blocks
+        self.samples: list[tuple[np.ndarray, np.ndarray]] = []  # each (velocity, rotation) in blocks
 
     def __len__(self) -> int:
         return len(self.times)
