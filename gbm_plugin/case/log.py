@@ -26,8 +26,7 @@ def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> 
     """
     if log.stat().st_size <= most:
         return
-    with log.open("a+b") as file:
-        file.seek(0)
+    with log.open("r+b") as file:  # written in place: after truncate(0) the other process could come first
         first = file.read(head)
         first = first[: first.rfind(b"\n") + 1]
         file.seek(len(first))
@@ -38,9 +37,11 @@ def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> 
         cut = last.find(b"\n") + 1
         end = file.tell()
         gap = f"\n[... {start + cut - len(first) - len(warnings)} {GAP} ...]\n".encode() + warnings
+        kept = first + gap + last[cut:]
+        os.pwrite(file.fileno(), kept, 0)
         newest = os.pread(file.fileno(), most, end)  # what came meanwhile
-        file.truncate(0)
-        file.write(first + gap + last[cut:] + newest)
+        os.pwrite(file.fileno(), newest, len(kept))
+        os.ftruncate(file.fileno(), len(kept) + len(newest))
 
 
 def summary(log: Path) -> str | None:

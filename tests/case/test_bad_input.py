@@ -323,6 +323,6 @@ def test_time_step_that_is_far_too_long(small):
     set_entry(small / CONTROL, "deltaT", "5")
     set_entry(small / CONTROL, "endTime", "1000")
     line = refused(small)
-    assert re.search("not finite|predicted with an error|SIGFPE|loating point", line), line
+    assert re.search("not finite|predicted with an error|SIGFPE|loating point|loses fiber", line), line
     with open_recording(small / "postProcessing/fibers") as recording:
         assert np.isfinite(recording.families["test"].positions[:]).all()
