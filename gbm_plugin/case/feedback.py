@@ -30,8 +30,10 @@ def own_ratio(radius: float, cell: float) -> float:
 
 def removes_own(scene, family) -> bool:
     """Whether the own disturbance of a family's beads is taken out of what they sample."""
+    if not scene.coupling.feedback:
+        return False
     choice, cell = scene.coupling.own_disturbance, cell_size(scene)
-    if not scene.coupling.feedback or choice == "kept" or cell is None:
+    if choice == "kept" or cell is None:
         return False
     return choice == "removed" or own_ratio(family.radius, cell) > NEGLIGIBLE
 

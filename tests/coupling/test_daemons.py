@@ -125,7 +125,8 @@ def test_shares_that_took_different_sub_steps_restart_to_the_last_bit(tmp_path):
     def fleets():
         for share in all_shares(2):
             own = family.part(share)
-            scene = SimpleNamespace(families=(own,), dynamic_viscosity=1e-2)
+            coupling = SimpleNamespace(feedback=False)
+            scene = SimpleNamespace(families=(own,), dynamic_viscosity=1e-2, coupling=coupling)
             yield Fleet.seeded(scene, np.zeros(3), np.ones(3), 0.0, share)
 
     def step(fleet):
