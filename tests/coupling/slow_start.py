@@ -7,5 +7,5 @@ import time
 from gbm_plugin.coupling import daemon
 
 logging.basicConfig(level=logging.INFO)
-daemon.prepare_kernels = lambda families: time.sleep(float(sys.argv[2]))
+daemon.prepare_kernels = lambda families, feedback: time.sleep(float(sys.argv[2]))
 daemon.serve(sys.argv[1])

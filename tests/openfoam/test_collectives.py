@@ -25,8 +25,8 @@ CALLS = {
     "lattice/uniformBox.C": (3, "made for each mesh, with the answer of periodicBox, which is one for all"),
     "lattice/latticeNeighbours.C": (8, "lattice is made for each mesh, where uniformBox has no problem"),
     "lattice/lattice.H": (
-        1,
-        "gather: by correction and sample, of every rank, with cells and beads or without",
+        2,
+        "gather by correction and sample, addBack by spread: of every rank, with cells and beads or without",
     ),
     "lattice/cellSearch.C": (
         6,
@@ -45,8 +45,15 @@ CALLS = {
         4,
         "made for each run; called in addSup, endRate and correct of every rank",
     ),
-    "fiberCoupling/fiberCoupling.C": (6, "once a step, provisional or not as all daemons together say"),
-    "fiberCoupling/sampling/beadExchange.C": (2, "locate and collect of every rank, with beads or without"),
+    "fiberCoupling/fiberCoupling.C": (
+        9,
+        "once a step, provisional or not as all daemons together say; three where the dictionary asks for feedback",
+    ),
+    "fiberCoupling/sampling/beadExchange.C": (
+        4,
+        "locate, collect and distribute of every rank, with beads or without",
+    ),
+    "fiberCoupling/sampling/beadExchange.H": (1, "the declaration of distribute"),
     "transform/slab.C": (2, "made for each mesh"),
     "transform/slabTransform.C": (2, "every rank sweeps, with layers and rows or without"),
     "boxFoam/boxFlow.C": (6, "once a sweep of every rank"),
