@@ -38,10 +38,11 @@ def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> 
         end = file.tell()
         gap = f"\n[... {start + cut - len(first) - len(warnings)} {GAP} ...]\n".encode() + warnings
         kept = first + gap + last[cut:]
-        os.pwrite(file.fileno(), kept, 0)
-        newest = os.pread(file.fileno(), most, end)  # what came meanwhile
-        os.pwrite(file.fileno(), newest, len(kept))
-        os.ftruncate(file.fileno(), len(kept) + len(newest))
+        length = os.pwrite(file.fileno(), kept, 0)
+        while newest := os.pread(file.fileno(), most, end):  # what came meanwhile
+            length += os.pwrite(file.fileno(), newest, length)
+            end += len(newest)
+        os.ftruncate(file.fileno(), length)
 
 
 def summary(log: Path) -> str | None:
