@@ -12,6 +12,7 @@ from ..files import replaced
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 LINES = ("-", "--", "-.", ":")
+MARKERS = "osD^vP*X"
 
 _STYLE = {
     "font.size": 11,

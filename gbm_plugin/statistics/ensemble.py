@@ -61,6 +61,13 @@ def estimate(series: ArrayLike, of_fibers: ArrayLike) -> Estimate:
     return Estimate(float(series.mean()), max(known, default=None), of_series, spread, time)
 
 
+def jackknife_error(parts: ArrayLike) -> NDArray[np.float64]:
+    """Standard error (...) of what was found M times, (M, ...), each time without one of M points: a fit tells its own
+    where points lie off the curve by more than their errors."""
+    parts = np.asarray(parts, float)
+    return np.sqrt((len(parts) - 1) / len(parts) * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+
+
 def correlation(values: ArrayLike, most: int) -> NDArray[np.float64]:
     """<v(t)·v(t + lag)>/<v²> for lags 0 … most of values (T, F, d), over fibers and times. ValueError where T is not
     larger than `most`."""

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, least_squares, minimize_scalar
 
+from .ensemble import jackknife_error
+
 RANGE = (0.02, 200.0)  # of γ
 
 
@@ -69,8 +71,7 @@ def fit(length: ArrayLike, ratio: ArrayLike, error: ArrayLike, prefactor: bool =
     whole, error, scatter = _solve(model, target, own, slice(None))
     if len(x) > 1:
         parts = [_solve(model, target, own, np.arange(len(x)) != i)[0] for i in range(len(x))]
-        spread = np.sqrt((len(x) - 1) / len(x) * ((np.array(parts) - np.mean(parts)) ** 2).sum())
-        error = max(error, float(spread))
+        error = max(error, float(jackknife_error(parts)))
     return Fit(whole, error if error > 0 else None, scatter, len(x))
 
 
@@ -109,8 +110,7 @@ def fit_transition(length: ArrayLike, ratio: ArrayLike) -> Transition:
 
     every = np.arange(len(x))
     whole = solve(every >= 0)
-    parts = np.array([solve(every != i) for i in every])
-    errors = np.sqrt((len(x) - 1) / len(x) * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    errors = jackknife_error([solve(every != i) for i in every])
     scatter = float(np.sqrt(np.mean(np.log(y / _transition(whole, x)) ** 2)))
     return Transition(*whole.tolist(), tuple(errors.tolist()), scatter)
 

@@ -22,7 +22,7 @@ from ..output.tables import read_forcing
 from ..scales import kolmogorov_length, kolmogorov_time, taylor_reynolds
 from ..statistics.ensemble import Estimate, fiber_average
 from ..statistics.wormlike import persistence_length
-from .study import option
+from .study import option, steps
 
 ENGINES = ("spectral", "stored")  # folders in a case that are runs
 BLOCK = 16 << 20  # bytes of positions read at once
@@ -220,6 +220,10 @@ class FinishedRun:
             model=record.model,
             time_step=float(step[1]) if step else None,
         )
+
+    def followed(self) -> Iterator[Family]:
+        """Its families, with a bar on a terminal."""
+        return steps(self.families, len(self.families), self.label)
 
     def measure(
         self, family: Family, *quantities: Callable[[NDArray], NDArray], rows: NDArray | None = None

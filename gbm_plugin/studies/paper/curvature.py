@@ -25,7 +25,7 @@ from ...statistics.densities import density, mean_pairwise, own_noise, quantiles
 from ...statistics.ensemble import fiber_average
 from ...statistics.fibers import mean_curvature
 from ..recorded import Family, Since, add_run_arguments, checked_bending, finished_runs, flow_lines, same_flow
-from ..study import compact, steps
+from ..study import compact
 
 BENT = 3.0  # L/l_p from which fibers buckle
 BINS = 40
@@ -71,7 +71,7 @@ def run(
     for finished in finished_runs(cases, since, records, families):
         flows.append(finished.summary())
         flow = next(i for i, earlier in enumerate(flows) if same_flow(earlier, flows[-1]))
-        for family in steps(finished.families, len(finished.families), finished.label):
+        for family in finished.followed():
             if family.beads > 2:
                 (values,) = finished.measure(family, lambda x, a=family.radius: mean_curvature(x, a))
                 samples.append(Sample(family, values, flow))

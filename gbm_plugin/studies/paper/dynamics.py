@@ -18,20 +18,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...report.style import COLOURS, new_figure
+from ...report.style import COLOURS, MARKERS, new_figure
 from ...statistics.contacts import closest_approach
 from ...statistics.ensemble import correlation, fiber_average, integral_scale
 from ...statistics.fibers import end_to_end, mean_curvature
 from ...statistics.orientation import AXES, alignments, directions, tumbling, vorticity
 from ..fields import fields_of
 from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
-from ..study import compact, option, steps
+from ..study import compact, option
 
 STRAIGHT = 0.8  # R/L, the paper's limit of buckling
 SHOWN = 200.0  # L/l_p, beyond which a family is not drawn
 TRACERS = 200_000  # random places, of which the box's means are those
 LAGS = 60  # kept of a correlation
-MARKERS = "osD^vP*X"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +51,7 @@ def run(
         flows.append(finished.summary())
         sampled, taken = _sampled(finished, states)
         fields.append({"run": finished.label, "fields": taken})
-        for family in steps(finished.families, len(finished.families), finished.label):
+        for family in finished.followed():
             row = family.row() | {"L_over_eta": family.contour / finished.flow.kolmogorov_length}
             if family.beads > 2:
                 own, curve = _moved(finished, family)

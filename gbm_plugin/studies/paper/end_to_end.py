@@ -17,9 +17,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...report.style import COLOURS, new_figure
+from ...report.style import COLOURS, MARKERS, new_figure
 from ...statistics.densities import density, distance_to
-from ...statistics.ensemble import fiber_average
+from ...statistics.ensemble import fiber_average, jackknife_error
 from ...statistics.fibers import end_to_end, gyration_radius
 from ..recorded import (
     Family,
@@ -30,10 +30,9 @@ from ..recorded import (
     finished_runs,
     flow_lines,
 )
-from ..study import compact, steps
+from ..study import compact
 
 BINS = 40
-MARKERS = "osD^vP*X"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +49,7 @@ def run(
     measured, densities, flows = [], [], []
     for finished in finished_runs(cases, since, records, families):
         flows.append(finished.summary())
-        for family in steps(finished.families, len(finished.families), finished.label):
+        for family in finished.followed():
             if family.beads > 2:
                 vectors, gyration = finished.measure(family, end_to_end, gyration_radius)
                 row = _row(finished, family, vectors / family.contour, gyration / family.contour)
@@ -147,8 +146,7 @@ def _slope(x: NDArray, y: NDArray) -> tuple[float, float]:
     line, and their own errors are smaller than that."""
     slope = np.polyfit(x, y, 1)[0]
     parts = [np.polyfit(np.delete(x, i), np.delete(y, i), 1)[0] for i in range(len(x))]
-    spread = (len(x) - 1) / len(x) * ((np.array(parts) - np.mean(parts)) ** 2).sum()
-    return float(slope), float(np.sqrt(spread))
+    return float(slope), float(jackknife_error(parts))
 
 
 def rows(result: dict) -> list[dict]:

@@ -18,8 +18,8 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...report.style import COLOURS, new_figure
-from ...statistics.ensemble import fiber_average
+from ...report.style import COLOURS, MARKERS, new_figure
+from ...statistics.ensemble import fiber_average, jackknife_error
 from ...statistics.fibers import end_to_end_squared_ratio
 from ...statistics.wormlike import (
     RANGE,
@@ -30,10 +30,8 @@ from ...statistics.wormlike import (
     squared_ratio,
 )
 from ..recorded import Family, Since, add_run_arguments, finished_runs, flow_lines, same_flow
-from ..study import steps
 
 PAPER, EXPERIMENT = 3.0, 2.0
-MARKERS = "osD^vP*X"
 BENT = 5.0  # L/l_p from which a family is bent for sure
 # L/l_p at which a free-draining fiber begins to buckle under compression at the rms longitudinal rate (ε/15ν)^(1/2):
 # 3πμSL⁴/K^b = 123.5 (docs/results/buckling.md), l_p⁴ = K^b (ν/ε)^(1/2)/μ
@@ -78,7 +76,7 @@ def run(
         flows.append(finished.summary())
         gradient = finished.flow.gradient
         factor = (finished.flow.dissipation.value / gradient) ** 0.125 if gradient > 0 else 1.0
-        for family in steps(finished.families, len(finished.families), finished.label):
+        for family in finished.followed():
             (values,) = finished.measure(family, lambda x, a=family.radius: end_to_end_squared_ratio(x, a))
             average = fiber_average(values)
             point = Point(family, average.value, average.error or 0.0, factor, finished.flow.forcing)
@@ -160,8 +158,7 @@ def _trend(measured: list[dict]) -> dict | None:
         return found[:2], float(np.sqrt(np.mean((y - x @ found) ** 2)))
 
     every = np.arange(len(y))
-    parts = np.array([solve("L_over_large", every != i)[0] for i in every])
-    error = np.sqrt((len(y) - 1) / len(y) * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    error = jackknife_error([solve("L_over_large", every != i)[0] for i in every])
     whole, rms = solve("L_over_large", every >= 0)
     return {
         "families": len(bent),

@@ -32,7 +32,7 @@ from ...statistics.orientation import (
 )
 from ..fields import fields_of
 from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
-from ..study import compact, option, steps
+from ..study import compact, option
 
 SETTLED, SPHERES = 0.09, 1 / 6
 STRAIGHT = 0.99  # <R²>/L² of a rod
@@ -61,7 +61,7 @@ def run(
     for finished in finished_runs(cases, since, records or 1 << 40, families):
         flows.append(finished.summary())
         aligned = _aligned(finished, states, kinematics)
-        for family in steps(finished.families, len(finished.families), finished.label):
+        for family in finished.followed():
             row, curve = _row(finished, family)
             if row:
                 found.append(row | aligned.get(family.name, {}))
@@ -75,7 +75,6 @@ def run(
 
 def _row(finished: FinishedRun, family: Family) -> tuple[dict, dict]:
     first = np.arange(min(4, len(finished.recording.times)))
-    some = finished.rows[:: max(1, len(finished.rows) // 20)]
     some = finished.rows[:: max(1, len(finished.rows) // 20)]
     (ratio,) = finished.measure(family, lambda x: end_to_end_squared_ratio(x, family.radius), rows=some)
     if ratio.mean() < STRAIGHT or family.beads < 3:

@@ -28,7 +28,6 @@ from ..recorded import (
     finished_runs,
     flow_lines,
 )
-from ..study import steps
 
 WITHIN = (0.25, 0.5, 0.75, 1.0)  # of each link, the places that count
 CELLS = 60  # of a picture, in each direction
@@ -49,7 +48,7 @@ def run(
     for finished in finished_runs(cases, since, records, families):
         flows.append(finished.summary())
         own = []
-        for family in steps(finished.families, len(finished.families), finished.label):
+        for family in finished.followed():
             if family.beads > 2:
                 (vectors,) = finished.measure(family, end_to_end)
                 own.append(_row(family, vectors))
