@@ -50,6 +50,13 @@ def rotation_of(gradient: NDArray) -> NDArray:
     return 0.5 * np.stack(curl, axis=-1)
 
 
+def gradient_of(rotation: NDArray) -> NDArray:
+    """The gradient (..., 3, 3) of a solid that turns at (..., 3): what `rotation_of` takes it from."""
+    x, y, z = np.moveaxis(rotation, -1, 0)
+    none = np.zeros_like(x)
+    return np.stack([none, -z, y, z, none, -x, -y, x, none], axis=-1).reshape(*x.shape, 3, 3)
+
+
 def lagrange_weights(times: Iterable[float], time: float) -> NDArray:
     """Weights of values at the given times in their interpolating polynomial at one time."""
     nodes = [float(own) for own in times]

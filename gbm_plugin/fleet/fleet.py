@@ -19,8 +19,9 @@ from ..errors import CaseError, PredictionError, StateError
 from ..fiber import Fibers, Group, Reaction, Stepper, merged_states, prepare
 from ..fiber.state import check_state, forms
 from ..files import replaced
+from ..sampling import gradient_of
 from ..statistics.fibers import end_to_end_squared_ratio
-from .own import SHELLS, OwnDisturbance, kernel
+from .own import CENTRAL2, CENTRAL6, SHELLS, Mesh, OwnDisturbance, kernels
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +37,7 @@ HEADER = {
     "time": ("f", ()),
 }  # of a state file, beside the families
 OWN = "own_disturbance"  # of a family, in a state file
-MOST_NUMBERS = 64  # of an array for each bead: 4 samples of velocity and rotation have 24
+MOST_NUMBERS = 96  # of an array for each bead: its own disturbance has up to 78
 SMALL = 1 << 16  # arrays of so many bytes are read, whatever they are
 
 
@@ -59,12 +60,12 @@ class Fleet(Group):
 
     @classmethod
     def seeded(
-        cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE, cut: float = 1.0
+        cls, scene: Scene, box_min, box_max, time: float, share: Share = WHOLE, cut: float | None = None
     ) -> Fleet:
         """New fibers, at random places and orientations in the box unless the case gives their positions.
 
         share: whose part of the families the scene has; their fibers are those that they are in the whole. cut: largest
-        wavenumber that the flow resolves, over π/Δx.
+        wavenumber that a spectral flow resolves, over π/Δx; None: the flow is the case's solver.
         """
         size = np.subtract(box_max, box_min)
         steppers = []
@@ -84,9 +85,8 @@ class Fleet(Group):
         fleet = cls(scene.families, steppers, share)
         for f in scene.families:
             if removes_own(scene, f):
-                where = (scene.interpolation, cell_size(scene), float(np.prod(size)) ** (1 / 3))
-                fluid = (scene.kinematic_viscosity, scene.density)
-                fleet._own[f.name] = OwnDisturbance(kernel(*where, *fluid, cut), f.count * f.beads)
+                own = kernels(_mesh(scene, size, cut), scene.kinematic_viscosity, scene.density)
+                fleet._own[f.name] = OwnDisturbance(own, f.count * f.beads)
         return fleet
 
     @property
@@ -97,17 +97,21 @@ class Fleet(Group):
     def observe(self, time: float, velocity: np.ndarray, extra: np.ndarray | None) -> None:
         """As that of Group, without what beads find of themselves where that is removed."""
         if self._own:
-            velocity = velocity - self.own_velocity
+            own = self.own_motion
+            velocity = velocity - own[:, 0]
+            if extra is not None:
+                extra = extra - (own[:, 1] if extra.ndim == 2 else gradient_of(own[:, 1]))
         super().observe(time, velocity, extra)
 
     @property
-    def own_velocity(self) -> np.ndarray:
-        """(B, 3) what beads find of themselves in the flow, where it is removed; 0 elsewhere [m/s]."""
-        velocity = np.zeros((self.beads, 3))
-        for family, part in zip(self.families, self.split(velocity), strict=True):
+    def own_motion(self) -> np.ndarray:
+        """(B, 2, 3) velocity and rotation that beads find of themselves in the flow, where these are removed; 0
+        elsewhere [m/s, 1/s]."""
+        motion = np.zeros((self.beads, 2, 3))
+        for family, part in zip(self.families, self.split(motion.reshape(-1, 6)), strict=True):
             if own := self._own.get(family.name):
-                part.reshape(-1, 3)[:] = own.velocity
-        return velocity
+                part.reshape(-1, 2, 3)[:] = own.motion
+        return motion
 
     def reaction(self, time_step: float) -> Reaction:
         self._reaction = super().reaction(time_step)
@@ -116,9 +120,10 @@ class Fleet(Group):
     def advance(self, time_step: float) -> None:
         self._step_length = time_step
         if self._own:
-            for family, force in zip(self.families, self.split(self._reaction.force), strict=True):
+            loads = (self.split(self._reaction.force), self.split(self._reaction.torque))
+            for family, force, torque in zip(self.families, *loads, strict=True):
                 if own := self._own.get(family.name):
-                    own.advance(force.reshape(-1, 3), time_step)
+                    own.advance(force.reshape(-1, 3), torque.reshape(-1, 3), time_step)
         super().advance(time_step)
 
     @property
@@ -178,7 +183,7 @@ class Fleet(Group):
         }
         for family in self.families:
             if own := self._own.get(family.name):
-                arrays[f"{family.name}/{OWN}"] = own.state().reshape(family.count, family.beads, -1, 3)
+                arrays[f"{family.name}/{OWN}"] = own.state().reshape(family.count, family.beads, -1, 6)
         buffer = io.BytesIO()
         np.savez(buffer, signature=self._signature(), step=step, time=time, **arrays)
         path = folder / STATE_FILE
@@ -235,7 +240,7 @@ class Fleet(Group):
                 own = _of_family(state, family.name)
                 check_state(own, part.stop - part.start, family.beads)
                 if family.name in self._own:
-                    form = ("f", (part.stop - part.start, family.beads, range(SHELLS, SHELLS + 4), 3))
+                    form = ("f", (part.stop - part.start, family.beads, range(SHELLS, SHELLS + 4), 6))
                     check_arrays(own, {OWN: form})
             except ValueError as error:
                 raise StateError(
@@ -247,6 +252,16 @@ class Fleet(Group):
     def _largest(self) -> int:
         """Beads of the largest family."""
         return max(family.total * family.beads for family in self.families)
+
+
+def _mesh(scene: Scene, size, cut: float | None) -> Mesh:
+    """How the flow sees a bead: a spectral one up to `cut`, or the case's solver."""
+    cell, box = cell_size(scene), float(np.prod(size)) ** (1 / 3)
+    if cut is not None:
+        return Mesh(scene.interpolation, cell, box, cut)
+    if scene.application == "boxFoam":  # without the fastest mode of an even number of cells
+        return Mesh(scene.interpolation, cell, box, 1 - cell / box, CENTRAL6)
+    return Mesh(scene.interpolation, cell, box, 1.0, CENTRAL2)
 
 
 def _of_family(state: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:

@@ -97,7 +97,7 @@ class Journal:
         if self.scene.coupling.feedback:
             self.reaction = fleet.reaction(self.scene.time_step)
             rotation = rotation_of(extra) if extra.ndim == 3 else extra
-            own = float(np.vdot(self.reaction.force, fleet.own_velocity))
+            own = self.reaction.exchange(*fleet.own_motion.swapaxes(0, 1))
             exchange = self.reaction.exchange(velocity, rotation)
             powers = [exchange, self.reaction.friction, self.reaction.bending, own]
         self._add_row(step, sent_at, arrived_at, gap, powers)

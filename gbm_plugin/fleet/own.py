@@ -4,17 +4,23 @@ A force F on the fluid is spread over about a cell Δx, and a bead that samples 
 Stokes flow a/(√π Δx) of its slip F/6πμa, for a Gaussian of that width. But Δx²/ν is several Kolmogorov times, and the
 disturbance that a bead finds is that of its past,
 
-    u(t) = ∫ F(t') K(t − t') dt',    K(τ) = (2/3ρ) ∫ |w(k)|² e^(−νk²τ) d³k/(2π)³,
+    u(t) = ∫ F(t') K(t − t') dt',    K(τ) = (2/3ρ) ∫ |w(k)|² e^(−νκ²τ) d³k/(2π)³,
 
 the response of the unsteady Stokes equations to the weights w of spreading and sampling, over the resolved k and from
-where the box begins; a Gaussian of width σ would have (2/3ρ) [4π(σ² + ντ)]^(−3/2). |w|² is the mean over the places
-of a bead between nodes. Taken together in shells of k it is a sum of exponentials, each of which needs no history:
-integrated with the weights with which the flow itself takes forces (Adams–Bashforth, the first two steps
-Runge–Kutta).
+where the box begins; κ² is the k² of the flow's own Laplacian. A Gaussian of width σ would have
+(2/3ρ) [4π(σ² + ντ)]^(−3/2). A torque T turns the bead in the same way,
+
+    Ω(t) = ∫ T(t') K'(t − t') dt',   K'(τ) = (1/12ρ) ∫ (|d|² + |d·k|²/k²) e^(−νκ²τ) d³k/(2π)³,
+
+d(k) being the weights of the gradient, ikw where it is exact: then, in steady flow and all of a cube of wavenumbers,
+(4π/3) (a/Δx)³ of its spin T/8πμa³. |w|² and |d|² are means over the places of a bead between nodes. Taken together in
+shells of k these are sums of exponentials, each of which needs no history: integrated with the weights with which the
+flow itself takes forces (Adams–Bashforth, the first two steps Runge–Kutta).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,86 +28,152 @@ from numpy.typing import NDArray
 
 SHELLS = 10
 WIDTHS = {"trilinear": 2, "cubic": 4, "quintic": 6}  # nodes in each direction
+CENTRAL2, CENTRAL6 = (
+    (1.0,),
+    (3 / 2, -3 / 20, 1 / 90),
+)  # Laplacians of OpenFOAM's `Gauss linear`, and of boxFoam
 ADAMS_BASHFORTH = np.array([23.0, -16.0, 5.0]) / 12
 
 
 class Kernel(NamedTuple):
-    """K(τ) = Σ weight e^(−rate τ): weights (M,) [1/kg] and rates (M,) [1/s]."""
+    """K(τ) = Σ weight e^(−rate τ): weights (M,), and rates (M,) [1/s]."""
 
     weight: NDArray
     rate: NDArray
 
 
-def kernel(word: str, cell: float, box: float, viscosity: float, density: float, cut: float = 1.0) -> Kernel:
-    """Of an interpolation on cells of this size in a cubic box [m]. viscosity: kinematic; cut: largest resolved
-    wavenumber in each direction over π/Δx. K(0) and ∫K dτ are exact for any number of shells."""
+class Mesh(NamedTuple):
+    """How a flow sees a bead. interpolation: of samples; cell, box: their sizes [m]; cut: largest resolved wavenumber
+    in each direction over π/Δx; laplacian: weights c_m of u(+m) − 2u + u(−m), none where derivatives are exact."""
+
+    interpolation: str
+    cell: float
+    box: float
+    cut: float = 1.0
+    laplacian: tuple[float, ...] = ()
+
+    def viscous(self, phase: NDArray) -> NDArray:
+        """(κΔx)² of one direction at phases kΔx."""
+        if not self.laplacian:
+            return phase**2
+        return sum(2 * c * (1 - np.cos((m + 1) * phase)) for m, c in enumerate(self.laplacian))
+
+
+def kernels(mesh: Mesh, viscosity: float, density: float) -> tuple[Kernel, Kernel]:
+    """Of the velocity by a force, and of the rotation by a torque [1/(kg m²)]. viscosity: kinematic. K(0) and ∫K dτ are
+    exact for any number of shells."""
+    cell, cut = mesh.cell, mesh.cut
     low = (
-        (3 / (4 * np.pi)) ** (1 / 3) * 2 * np.pi / box
+        (3 / (4 * np.pi)) ** (1 / 3) * 2 * np.pi / mesh.box
     )  # a sphere of the volume of one mode, which is the mean
     high = np.sqrt(3) * np.pi * cut / cell
     edges = np.geomspace(low, high, 40 * SHELLS + 1)
     k = np.sqrt(edges[1:] * edges[:-1])
+    volume = (edges[1:] ** 3 - edges[:-1] ** 3) / (6 * np.pi**2)
     directions = np.random.default_rng(0).standard_normal((2000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     phase = np.abs(k[:, None, None] * directions) * cell
-    seen = np.where(phase <= np.pi * cut, _response(word, phase), 0.0).prod(axis=2).mean(axis=1)
-    parts = 2 / (3 * density) * seen * (edges[1:] ** 3 - edges[:-1] ** 3) / (6 * np.pi**2)
-    weight = parts.reshape(SHELLS, -1).sum(axis=1)
-    steady = (parts / (viscosity * k**2)).reshape(SHELLS, -1).sum(axis=1)
-    return Kernel(weight, weight / steady)
+    decay = viscosity / cell**2 * mesh.viscous(phase).sum(axis=2)
+    seen = np.where(phase <= np.pi * cut, _response(mesh.interpolation, phase), 0.0)
+    slope, both = _slopes(mesh, phase, seen)
+    d = np.abs(directions)
+    turned, along = np.zeros((2, *seen.shape[:2]))
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        own = slope[..., i] * seen[..., j] * seen[..., m]
+        turned += own
+        along += d[:, i] ** 2 * own
+        along += 2 * d[:, i] * d[:, j] * both[..., i] * both[..., j] * seen[..., m]
+
+    def shells(response: NDArray, factor: float) -> Kernel:
+        at_once = factor * volume * response.mean(axis=1)
+        steady = factor * volume * (response / decay).mean(axis=1)
+        weight = at_once.reshape(SHELLS, -1).sum(axis=1)
+        return Kernel(weight, weight / steady.reshape(SHELLS, -1).sum(axis=1))
+
+    return (
+        shells(seen.prod(axis=2), 2 / (3 * density)),
+        shells((turned + along) / cell**2, 1 / (12 * density)),
+    )
+
+
+def _weights(word: str, x: float) -> tuple[NDArray, NDArray, NDArray]:
+    """The nodes in one direction around a place x between 0 and 1, the weights of their values and of their slope."""
+    width = WIDTHS[word]
+    nodes = np.arange(width) - (width // 2 - 1)
+    basis = [
+        np.poly1d([r for r in nodes if r != q], r=True) / np.prod([q - r for r in nodes if r != q])
+        for q in nodes
+    ]
+    return nodes, np.array([b(x) for b in basis]), np.array([b.deriv()(x) for b in basis])
+
+
+def _table(word: str, which: Callable[[NDArray, NDArray], NDArray]) -> tuple[NDArray, NDArray]:
+    """Means over places between two nodes, for phases from 0 to π: which(w, s) of the responses of value and slope."""
+    phases, places = np.linspace(0, np.pi, 129), (np.arange(16) + 0.5) / 16
+    total = np.zeros(phases.shape)
+    for x in places:
+        nodes, weights, slopes = _weights(word, x)
+        waves = np.exp(1j * np.outer(phases, nodes))
+        total += which(waves @ weights, waves @ slopes) / len(places)
+    return phases, total
 
 
 def _response(word: str, phase: NDArray) -> NDArray:
     """|w|² in one direction at phases kΔx, the mean over places between two nodes."""
     if word == "exact":
         return np.ones(phase.shape)
-    width = WIDTHS[word]
-    nodes = np.arange(width) - (width // 2 - 1)
-    places = (np.arange(16) + 0.5) / 16
-    table = np.linspace(0, np.pi, 129)
-    total = np.zeros(table.shape)
-    for x in places:
-        weights = [np.prod([(x - r) / (q - r) for r in nodes if r != q]) for q in nodes]
-        total += np.abs(np.exp(1j * np.outer(table, nodes)) @ weights) ** 2 / len(places)
-    return np.interp(phase, table, total)
+    return np.interp(phase, *_table(word, lambda w, s: np.abs(w) ** 2))
+
+
+def _slopes(mesh: Mesh, phase: NDArray, seen: NDArray) -> tuple[NDArray, NDArray]:
+    """Of the gradient's weights s in one direction, in units of cells: means of |s|² and of Im(s w*)."""
+    if not mesh.laplacian:
+        return phase**2 * seen, phase * seen
+    if mesh.interpolation == "trilinear":  # central differences, interpolated
+        return np.sin(phase) ** 2 * seen, np.sin(phase) * seen
+    resolved = seen > 0
+    slope = np.interp(phase, *_table(mesh.interpolation, lambda w, s: np.abs(s) ** 2))
+    both = np.interp(phase, *_table(mesh.interpolation, lambda w, s: (s * w.conj()).imag))
+    return slope * resolved, both * resolved
 
 
 class OwnDisturbance:
-    """That of beads (B, 3), from their forces so far."""
+    """That of beads (B, 3), from their forces and torques so far."""
 
-    def __init__(self, kernel: Kernel, beads: int):
-        self.kernel = kernel
-        self._parts = np.zeros((len(kernel.rate), beads, 3))
-        self._forces: list[NDArray] = []  # newest first
+    def __init__(self, kernels: tuple[Kernel, Kernel], beads: int):
+        self._weight, self._rate = (np.stack(a, axis=1)[:, None, :, None] for a in zip(*kernels, strict=True))
+        self._parts = np.zeros((SHELLS, beads, 2, 3))
+        self._loads: list[NDArray] = []  # (B, 2, 3), newest first
 
     @property
-    def velocity(self) -> NDArray:
-        """(B, 3) now [m/s]."""
-        return np.tensordot(self.kernel.weight, self._parts, axes=1)
+    def motion(self) -> NDArray:
+        """Velocity and rotation now, (B, 2, 3) [m/s, 1/s]."""
+        return (self._weight * self._parts).sum(axis=0)
 
-    def advance(self, force: NDArray, time_step: float) -> None:
-        """One step, at whose start the beads put this force (B, 3) on the flow; all steps are equal."""
-        self._forces = [force, *self._forces][:3]
-        fade = np.exp(-self.kernel.rate * time_step)[:, None, None]
+    def advance(self, force: NDArray, torque: NDArray, time_step: float) -> None:
+        """One step, at whose start the beads put these (B, 3) on the flow; all steps are equal."""
+        loads = np.stack([force, torque], axis=1)
+        self._loads = [loads, *self._loads][:3]
+        fade = np.exp(-self._rate * time_step)
         self._parts *= fade
-        if len(self._forces) < 3:
-            self._parts += time_step / 6 * (fade + 4 * np.sqrt(fade) + 1) * force
+        if len(self._loads) < 3:
+            self._parts += time_step / 6 * (fade + 4 * np.sqrt(fade) + 1) * loads
             return
-        for age, (weight, past) in enumerate(zip(ADAMS_BASHFORTH, self._forces, strict=True)):
+        for age, (weight, past) in enumerate(zip(ADAMS_BASHFORTH, self._loads, strict=True)):
             self._parts += time_step * weight * fade ** (1 + age) * past
 
     def state(self) -> NDArray:
-        """(B, M + S, 3): the parts, and the forces of up to three steps."""
-        return np.concatenate(
-            [self._parts, np.array(self._forces).reshape(-1, *self._parts.shape[1:])]
-        ).swapaxes(0, 1)
+        """(B, M + S, 6): the parts, and the loads of up to three steps."""
+        whole = np.concatenate([self._parts, np.array(self._loads).reshape(-1, *self._parts.shape[1:])])
+        return whole.reshape(*whole.shape[:2], 6).swapaxes(0, 1)
 
     def restore(self, state: NDArray) -> None:
         """Take back what state() gave. ValueError for another number of beads or shells."""
-        beads, shells = self._parts.shape[1], len(self.kernel.rate)
-        if state.shape[0] != beads or not shells <= state.shape[1] <= shells + 3 or state.shape[2:] != (3,):
+        beads = self._parts.shape[1]
+        if state.shape[0] != beads or not SHELLS <= state.shape[1] <= SHELLS + 3 or state.shape[2:] != (6,):
             raise ValueError(
-                f"the own disturbance is {state.shape}; it must be ({beads}, {shells} ... + 3, 3)"
+                f"the own disturbance is {state.shape}; it must be ({beads}, {SHELLS} ... + 3, 6)"
             )
-        arrays = np.ascontiguousarray(state.swapaxes(0, 1))
-        self._parts, self._forces = arrays[:shells], list(arrays[shells:])
+        arrays = np.ascontiguousarray(state.swapaxes(0, 1)).reshape(-1, beads, 2, 3)
+        self._parts, self._loads = arrays[:SHELLS], list(arrays[SHELLS:])

@@ -38,7 +38,7 @@ COMPLETE = "the run to time %g is complete; --fresh repeats it"
 class Carrier:
     """A flow on its way through time beside the fibers. All but `sample` and `on_cells` may be left as they are."""
 
-    cut = 1.0  # largest resolved wavenumber over π/Δx
+    cut: float | None = None  # largest resolved wavenumber of a spectral flow, over π/Δx
 
     def sample(self, positions: np.ndarray, time: float, need: str):
         """As in gbm_plugin.flow, at the present time of the run."""

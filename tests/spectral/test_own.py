@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gbm_plugin.case.feedback import own_ratio
-from gbm_plugin.fleet.own import OwnDisturbance, kernel
+from gbm_plugin.fleet.own import Mesh, OwnDisturbance, kernels
+from gbm_plugin.sampling import gradient_of, rotation_of
 from gbm_plugin.spectral import SpectralSolver
 
 BOX, NU = 2 * np.pi, 0.05
@@ -16,16 +17,18 @@ def dragged(word, cells, speed, steps=300, scheme_steps=0.05):
     cell = BOX / cells
     step = scheme_steps * cell**2 / NU
     solver = SpectralSolver(cells, NU, box=BOX, time_step=step, interpolation=word)
-    own = OwnDisturbance(kernel(word, cell, BOX, NU, 1.0, (2 * solver.modes.cut + 1) / cells), 1)
+    mesh = Mesh(word, cell, BOX, (2 * solver.modes.cut + 1) / cells)
+    own = OwnDisturbance(kernels(mesh, NU, 1.0), 1)
     direction = np.array([[1.0, 0.3, 0.2]])
     direction /= np.linalg.norm(direction)
-    place, force, found = cell * np.array([[0.1, 0.2, 0.3]]), 1e-6 * direction, []
+    place, load, found = cell * np.array([[0.1, 0.2, 0.3]]), np.zeros((2, 1, 3)), []
+    load[0] = 1e-6 * direction
     for _ in range(steps):
-        u, _ = solver.sample(place, solver.time, "velocity")
-        found.append([np.linalg.norm(u), np.linalg.norm(u - own.velocity)])
-        solver.set_point_forces(place, force)
+        u = solver.sample(place, solver.time, "velocity")[0]
+        found.append([np.linalg.norm(u), np.linalg.norm(u - own.motion[:, 0])])
+        solver.set_point_forces(place, load[0])
         solver.advance(1)
-        own.advance(force, step)
+        own.advance(*load, step)
         place = place + speed * scheme_steps * cell * direction
     return np.array(found).T * 1e6
 
@@ -41,11 +44,33 @@ def test_a_dragged_bead_moves_as_in_an_unbounded_fluid(word, cells):
         assert rest.max() < left * found[-1]
 
 
+@pytest.mark.parametrize("word", ["trilinear", "cubic", "exact"])
+def test_the_kernels_are_the_means_over_places_between_nodes(word):
+    """Of the velocity by a force and the rotation by a torque, after one step."""
+    cells, found = 12, []
+    cell = BOX / cells
+    step = 0.05 * cell**2 / NU
+    solver = SpectralSolver(cells, NU, box=BOX, time_step=step, interpolation=word)
+    own = OwnDisturbance(kernels(Mesh(word, cell, BOX, (2 * solver.modes.cut + 1) / cells), NU, 1.0), 1)
+    load = np.array([[1.0, 0.3, 0.2]]) * 1e-6
+    own.advance(load, load, step)
+    start = solver.state()
+    for place in (np.stack(np.unravel_index(np.arange(64), (4, 4, 4)), axis=1) + 0.5) / 4 * cell:
+        for loads in ((load, None), (0 * load, load)):
+            solver.restore(start)
+            solver.set_point_forces(place[None], *loads)
+            solver.advance(1)
+            u, spin = solver.sample(place[None], solver.time, "rotation")
+            found.append((u if loads[1] is None else spin)[0])
+    mean = np.array(found).reshape(64, 2, 3).mean(axis=0)
+    np.testing.assert_allclose(mean, own.motion[0], rtol=0.04)
+
+
 @pytest.mark.parametrize(("word", "factor"), [("trilinear", 1.82), ("cubic", 2.33), ("exact", 2.65)])
 def test_the_ratio_that_is_said_has_the_right_size(word, factor):
     """a/(√π Δx) is that of a Gaussian as wide as a cell; the mesh's own kernels are up to 2.8 times narrower. Factors
     of a bead held for 400 steps in the solver at 16³, where it is steady to 2 %."""
-    k = kernel(word, BOX / 16, BOX, NU, 1.0, 11 / 16)
+    k, _ = kernels(Mesh(word, BOX / 16, BOX, 11 / 16), NU, 1.0)
     slip = 1 / (6 * np.pi * NU)  # of a bead of radius 1
     assert (k.weight / k.rate).sum() / slip == pytest.approx(factor * own_ratio(1.0, BOX / 16), rel=0.03)
 
@@ -53,10 +78,12 @@ def test_the_ratio_that_is_said_has_the_right_size(word, factor):
 def test_the_exact_sum_has_the_kernel_of_a_cube_of_modes():
     """∫ d³k/k² over the cube |k_i| < κ is 15.348 κ, less the sphere of the mean mode."""
     cell, cut = BOX / 64, 43 / 64
-    k = kernel("exact", cell, BOX, NU, 1.0, cut)
+    k, turning = kernels(Mesh("exact", cell, BOX, cut), NU, 1.0)
     low = (3 / (4 * np.pi)) ** (1 / 3)  # of the box's k0 = 1
     expected = 2 / 3 / (2 * np.pi) ** 3 * (15.348 * np.pi * cut / cell - 4 * np.pi * low) / NU
     assert (k.weight / k.rate).sum() == pytest.approx(expected, rel=0.01)
+    # of a torque 1/6μ times the modes of that cube in a volume: 4π/3 (a/Δx)³ of the spin T/8πμa³
+    assert (turning.weight / turning.rate).sum() == pytest.approx(cut**3 / cell**3 / (6 * NU), rel=0.01)
 
 
 def test_the_kernel_is_that_of_a_gaussian_for_a_gaussian(monkeypatch):
@@ -65,25 +92,34 @@ def test_the_kernel_is_that_of_a_gaussian_for_a_gaussian(monkeypatch):
 
     cell, sigma = 1.0, 2.0
     monkeypatch.setattr(own, "_response", lambda word, phase: np.exp(-((sigma * phase / cell) ** 2)))
-    k = kernel("exact", cell, 2000.0, 0.1, 1.5)
+    k, turning = kernels(Mesh("exact", cell, 2000.0), 0.1, 1.5)
     for tau in (0.0, 10.0, 100.0, 1000.0):
         expected = 2 / (3 * 1.5) * (4 * np.pi * (sigma**2 + 0.1 * tau)) ** -1.5
         assert (k.weight * np.exp(-k.rate * tau)).sum() == pytest.approx(expected, rel=0.1)
     assert (k.weight / k.rate).sum() == pytest.approx(1 / (6 * np.pi**1.5 * 0.1 * 1.5 * sigma), rel=0.01)
+    # ∫ k² e^(−k²(σ² + ντ)) d³k/(2π)³ = (3/2) [4π(σ² + ντ)]^(−3/2) / (σ² + ντ)
+    assert turning.weight.sum() == pytest.approx(
+        1.5 * (4 * np.pi * sigma**2) ** -1.5 / sigma**2 / (6 * 1.5), rel=0.01
+    )
 
 
 def test_its_state_continues_it():
-    k = kernel("cubic", 0.1, 1.0, 0.01, 1.0)
+    k = kernels(Mesh("cubic", 0.1, 1.0), 0.01, 1.0)
     whole, first = OwnDisturbance(k, 4), OwnDisturbance(k, 4)
-    forces = np.random.default_rng(1).standard_normal((6, 4, 3))
-    for n, force in enumerate(forces):
-        whole.advance(force, 0.01)
+    forces = np.random.default_rng(1).standard_normal((6, 2, 4, 3))
+    for n, loads in enumerate(forces):
+        whole.advance(*loads, 0.01)
         if n < 3:
-            first.advance(force, 0.01)
+            first.advance(*loads, 0.01)
     second = OwnDisturbance(k, 4)
     second.restore(first.state())
-    for force in forces[3:]:
-        second.advance(force, 0.01)
-    np.testing.assert_array_equal(second.velocity, whole.velocity)
+    for loads in forces[3:]:
+        second.advance(*loads, 0.01)
+    np.testing.assert_array_equal(second.motion, whole.motion)
     with pytest.raises(ValueError, match="own disturbance is"):
         OwnDisturbance(k, 5).restore(first.state())
+
+
+def test_a_turning_solid_has_its_rotation():
+    spin = np.random.default_rng(2).standard_normal((5, 3))
+    np.testing.assert_allclose(rotation_of(gradient_of(spin)), spin, rtol=1e-15)
