@@ -11,7 +11,7 @@ import pytest
 from gbm_plugin.case.openfoam import fatal_message
 from gbm_plugin.output.tables import read_dat
 
-from conftest import make_case, start_solver
+from conftest import make_case, solver_log, start_solver
 from fakes import until
 
 pytestmark = pytest.mark.openfoam
@@ -20,12 +20,16 @@ STEPS = 10
 LATE_DAEMON = Path(__file__).with_name("late_daemon.py")
 
 
-def run(path, ahead: int, timeout: float = 300):
+# steps that each solver is ahead of positions that it does not need yet
+AHEAD = {"pimpleFoam": 1, "boxFoam": 2}
+
+
+def run(path, solver: str, ahead: int, timeout: float = 300):
     """The solver's exit code in a run whose daemon sends positions only once the solver is so many steps ahead."""
-    make_case(path, steps=STEPS, cells=10, tight=False, timeout=timeout)
-    (path / "log.pimpleFoam").touch()
+    make_case(path, steps=STEPS, cells=10, tight=False, timeout=timeout, application=solver)
+    solver_log(path).touch()
     with (path / "log.gbmDaemon").open("w") as log:
-        argv = [sys.executable, LATE_DAEMON, path, str(ahead), str(STEPS)]
+        argv = [sys.executable, LATE_DAEMON, path, solver_log(path), str(ahead), str(STEPS)]
         daemon = subprocess.Popen(argv, stdout=log, stderr=log)
     try:
         until((path / "gbm.sock").exists, "the daemon's socket")
@@ -35,16 +39,18 @@ def run(path, ahead: int, timeout: float = 300):
         daemon.wait()
 
 
-def test_the_solver_needs_no_positions_before_it_has_solved_the_step(tmp_path):
-    """Those of step n + 1 are made of the sample of step n, and wait until step n + 1 is solved. Without overlap each
-    side would wait for the other."""
+@pytest.mark.parametrize("solver", AHEAD)
+def test_the_solver_needs_no_positions_before_it_has_solved_the_step(tmp_path, solver):
+    """Those of step n + 1 are made of the sample of step n, and wait until step n + 1 is solved: without overlap each
+    side would wait for the other. boxFoam solves step n + 2 while these positions come and are sampled at."""
     path = tmp_path / "case"
-    assert run(path, 1) == 0, (path / "log.pimpleFoam").read_text()[-2000:]
+    assert run(path, solver, AHEAD[solver]) == 0, solver_log(path).read_text()[-2000:]
     flow = read_dat(path / "postProcessing/fibers", "coupling.dat")
     assert len(flow["Time"]) == STEPS + 1
 
 
-def test_nor_does_it_solve_a_step_ahead_of_them(tmp_path):
+@pytest.mark.parametrize("solver", AHEAD)
+def test_nor_does_it_solve_a_step_ahead_of_them(tmp_path, solver):
     path = tmp_path / "case"
-    assert run(path, 2, timeout=3) == 1
-    assert "the daemon was silent" in fatal_message(path / "log.pimpleFoam")
+    assert run(path, solver, AHEAD[solver] + 1, timeout=3) == 1
+    assert "the daemon was silent" in fatal_message(solver_log(path))

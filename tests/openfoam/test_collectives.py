@@ -26,7 +26,7 @@ CALLS = {
     "lattice/latticeNeighbours.C": (8, "lattice is made for each mesh, where uniformBox has no problem"),
     "lattice/lattice.H": (
         2,
-        "gather by correction and sample, addBack by spread: of every rank, with cells and beads or without",
+        "gather by correction and look, addBack by spread: of every rank, with cells and beads or without",
     ),
     "lattice/cellSearch.C": (
         6,

@@ -1,4 +1,5 @@
 #include "boxFlow.H"
+#include "besideSolver.H"
 #include "kernels.H"
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
@@ -220,6 +221,7 @@ void Foam::boxFlow::set(const List<double>& modes)
 void Foam::boxFlow::store(volVectorField& U) const
 {
     vectorField& cells = U.primitiveFieldRef();
+    besideSolver::replace(cells);
 
     for (label z = 0; z < cells_.layers(); ++z)
     {

@@ -21,6 +21,7 @@ Description
 \*---------------------------------------------------------------------------*/
 
 #include "adamsBashforth3.H"
+#include "besideSolver.H"
 #include "feedback.H"
 #include "flowState.H"
 #include "kinematicViscosity.H"
@@ -107,6 +108,9 @@ int main(int argc, char *argv[])
             U.correctBoundaryConditions();
         }
     };
+
+    // the flow has its own arrays, and U is written at once
+    besideSolver::offer();
 
     if (feedback::wanted(runTime))
     {

@@ -1,5 +1,6 @@
 #include "fiberCoupling.H"
 #include "allowedEntries.H"
+#include "besideSolver.H"
 #include "consistentStart.H"
 #include "feedback.H"
 #include "keepEarlier.H"
@@ -125,7 +126,7 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
         {
             columns.append(wordList({"forces", "spreading"}));
         }
-        columns.append(wordList({"arrivedAt", "sentAt"}));
+        columns.append(wordList({"held", "arrivedAt", "sentAt"}));
         for (const word& column : columns)
         {
             writeTabbed(file(), column);
@@ -257,7 +258,7 @@ void Foam::functionObjects::fiberCoupling::learnFamilies()
 }
 
 
-bool Foam::functionObjects::fiberCoupling::receivePositions
+Foam::Pair<bool> Foam::functionObjects::fiberCoupling::receivePositions
 (
     List<point>& positions,
     times& t
@@ -280,7 +281,7 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
         const std::uint32_t flags = daemon.receivePositions
         (
             step_,
-            time_.value(),
+            t.time,
             1e-6*deltaT_,
             SubList<point>(positions, daemon.beads(), start)
         );
@@ -301,16 +302,9 @@ bool Foam::functionObjects::fiberCoupling::receivePositions
             << " positions and others not: they did not start from the same"
             << " time" << exit(FatalError);
     }
-    if (daemons.z())
-    {
-        Info<< type() << ": a daemon was asked to end the run:"
-            << " writing and stopping after the next step" << endl;
-        time_.stopAt(Time::stopAtControls::saWriteNow);
-    }
-
     t.wait += watch.lap();
 
-    return daemons.y();
+    return {daemons.y() > 0, daemons.z() > 0};
 }
 
 
@@ -320,13 +314,12 @@ Foam::scalarList Foam::functionObjects::fiberCoupling::sendSample
     times& t
 )
 {
-    const volVectorField& U = mesh_.lookupObject<volVectorField>(UName_);
     const label n = 3 + components(wanted_);
     stopwatch watch;
 
     scalarList sampled
     (
-        sampler_->sample(U, wanted_, beads_())
+        sampler_->sample(wanted_, beads_())
     );
     t.sampling += watch.lap();
 
@@ -338,9 +331,9 @@ Foam::scalarList Foam::functionObjects::fiberCoupling::sendSample
         daemon.sendSample
         (
             step_,
-            time_.value(),
+            t.time,
             SubList<scalar>(values, n*daemon.beads(), start),
-            time_.writeTime() && !provisional
+            t.keep && !provisional
         );
         start += n*daemon.beads();
     }
@@ -406,18 +399,18 @@ void Foam::functionObjects::fiberCoupling::receiveForces
 }
 
 
-void Foam::functionObjects::fiberCoupling::exchange()
+bool Foam::functionObjects::fiberCoupling::serve(scalarList& sampled, times& t)
 {
-    times t{0, 0, 0, 0, 0, 0};
-    scalarList sampled;
-    scalar arrived = 0;
     bool provisional = true;
+    bool stop = false;
 
     while (provisional)
     {
         List<point> positions;
-        provisional = receivePositions(positions, t);
-        arrived = timeOfDay();
+        const Pair<bool> flags(receivePositions(positions, t));
+        provisional = flags.first();
+        stop = stop || flags.second();
+        t.arrived = timeOfDay();
 
         stopwatch watch;
         beads_->locate(std::move(positions));
@@ -425,20 +418,82 @@ void Foam::functionObjects::fiberCoupling::exchange()
 
         sampled = sendSample(provisional, t);
     }
+    t.left = timeOfDay();
+
+    return stop;
+}
+
+
+void Foam::functionObjects::fiberCoupling::conclude
+(
+    const bool stop,
+    const scalar held,
+    const times& t
+)
+{
+    if (stop)
+    {
+        Info<< type() << ": a daemon was asked to end the run:"
+            << " writing and stopping after the next step" << endl;
+        time_.stopAt(Time::stopAtControls::saWriteNow);
+    }
+    writeTimes(t, held);
+}
+
+
+void Foam::functionObjects::fiberCoupling::exchange()
+{
+    sampler_->look(mesh_.lookupObject<volVectorField>(UName_));
+
+    // at write times the daemons' state is next, and forces are needed now
+    const bool beside =
+        besideSolver::offered()
+     && time_.timeIndex() != time_.startTimeIndex()
+     && !time_.writeTime()
+     && !Pstream::parRun()
+     && !feedback_
+     && sampler_->onlyReads();
+
+    times t{};
+    t.time = time_.value();
+    t.keep = time_.writeTime();
+
+    if (beside)
+    {
+        struct turn { times t; bool stop; };
+        const std::shared_ptr<turn> now(new turn{t, false});
+
+        besideSolver::start
+        (
+            [this, now]()
+            {
+                scalarList sampled;
+                now->stop = serve(sampled, now->t);
+            },
+            [this, now](const scalar waited)
+            {
+                conclude(now->stop, waited, now->t);
+            }
+        );
+        return;
+    }
+
+    scalarList sampled;
+    stopwatch watch;
+    const bool stop = serve(sampled, t);
     if (feedback_)
     {
         receiveForces(sampled, t);
+        t.left = timeOfDay();
     }
-
-    writeTimes(t, arrived, timeOfDay());
+    conclude(stop, watch.lap(), t);
 }
 
 
 void Foam::functionObjects::fiberCoupling::writeTimes
 (
     const times& t,
-    scalar arrived,
-    scalar left
+    const scalar held
 )
 {
     scalarList spent({t.wait, t.location, t.sampling, t.sending});
@@ -446,18 +501,19 @@ void Foam::functionObjects::fiberCoupling::writeTimes
     {
         spent.append(scalarList({t.forces, t.spreading}));
     }
+    spent.append(held);
     Pstream::listCombineGather(spent, maxEqOp<scalar>());
 
     if (Pstream::master())
     {
-        writeCurrentTime(file());
+        file() << setw(charWidth()) << Time::timeName(t.time);
         for (const scalar seconds : spent)
         {
             file() << token::TAB << seconds;
         }
         file()
             << setprecision(17)
-            << token::TAB << arrived << token::TAB << left
+            << token::TAB << t.arrived << token::TAB << t.left
             << setprecision(writePrecision_) << endl;
     }
 }
@@ -481,6 +537,7 @@ void Foam::functionObjects::fiberCoupling::advance()
             << exit(FatalError);
     }
 
+    besideSolver::finish();
     ++step_;
     exchange();
 }
@@ -503,6 +560,14 @@ void Foam::functionObjects::fiberCoupling::save()
     {
         daemon.save(step_, time_.value(), timeFolder());
     }
+}
+
+
+// * * * * * * * * * * * * * * * * Destructor  * * * * * * * * * * * * * * * //
+
+Foam::functionObjects::fiberCoupling::~fiberCoupling()
+{
+    besideSolver::finish();
 }
 
 
@@ -575,6 +640,7 @@ bool Foam::functionObjects::fiberCoupling::end()
 {
     const fatalErrors guard;
 
+    besideSolver::finish();
     for (fiberDaemon& daemon : daemons_)
     {
         daemon.end(step_, time_.value());

@@ -1,4 +1,5 @@
 #include "fiberDaemon.H"
+#include "besideSolver.H"
 #include "scalarList.H"
 #include "Switch.H"
 
@@ -216,9 +217,12 @@ void Foam::fiberDaemon::sendSample
     {
         if (!std::isfinite(values[i]))
         {
-            FatalErrorInFunction
-                << "the flow at bead " << i/n << " is not finite at step "
-                << step << ", time " << time << exit(FatalError);
+            besideSolver::fail
+            (
+                "the flow at bead " + std::to_string(i/n)
+              + " is not finite at step " + std::to_string(step) + ", time "
+              + Foam::name(time)
+            );
         }
     }
 

@@ -68,13 +68,13 @@ def run(case: Path | str, cells: int = 64, turns: int = 2) -> dict:
     found = []
     for r in [*few.values(), *many.values()]:
         base = few[r["ranks"]]
-        flow = base["step"] - sum(base[name] for name in PARTS)
+        flow = base["step"] - base["held"]
         predicted = predict(c, flow, r["fibers"] * r["beads"], r["ranks"], r["daemons"])
         coupling_time = sum(r[name] for name in PARTS if name != "wait")
         found.append(r | {"coupling": coupling_time} | {f"{k}_model": v for k, v in predicted.items()})
     limits = {}
     for ranks, r in few.items():
-        flow = r["step"] - sum(r[name] for name in PARTS)
+        flow = r["step"] - r["held"]
         limits[ranks] = {"flow": flow, "fibers": (flow - c["daemon"][0]) / c["daemon"][1] / BEADS}
     return {"constants": c, "rows": found, "limits": limits}
 

@@ -102,14 +102,14 @@ SETTINGS |= {
     }.items()
 }
 
-# one of std::chrono's clocks, that of OpenFOAM's profiling or of the coupling's table, replaced by that of the process
+# one of std::chrono's clocks, that of OpenFOAM's profiling or of the coupling's table, replaced by that of the thread
 PROCESS_CLOCK = """
 #include <chrono>
 #include <ctime>
 std::chrono::CLOCK::time_point std::chrono::CLOCK::now() noexcept
 {
     timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return time_point(std::chrono::seconds(t.tv_sec) + std::chrono::nanoseconds(t.tv_nsec));
 }
 """

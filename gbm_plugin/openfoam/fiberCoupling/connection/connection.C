@@ -1,5 +1,6 @@
 #include "connection.H"
 #include "allowedEntries.H"
+#include "besideSolver.H"
 #include "socketConnection.H"
 #include "fileConnection.H"
 #include "OSspecific.H"
@@ -120,12 +121,12 @@ Foam::connection::clock::time_point Foam::connection::deadline() const
 
 void Foam::connection::fail(const string& what) const
 {
-    FatalErrorInFunction
-        << "fiber coupling, step " << label(step_) << ": "
-        << what.c_str() << " (daemon on " << peer_.c_str() << ", its log: "
-        << (case_/share_.name("log.gbmDaemon")).c_str() << ")" << exit(FatalError);
-
-    ::abort();
+    besideSolver::fail
+    (
+        "fiber coupling, step " + std::to_string(step_) + ": " + what
+      + " (daemon on " + peer_ + ", its log: "
+      + (case_/share_.name("log.gbmDaemon")) + ")"
+    );
 }
 
 

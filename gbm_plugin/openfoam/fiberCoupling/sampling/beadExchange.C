@@ -1,4 +1,5 @@
 #include "beadExchange.H"
+#include "besideSolver.H"
 #include "PstreamBuffers.H"
 
 // * * * * * * * * * * * * * * * * Constructors  * * * * * * * * * * * * * * //
@@ -184,9 +185,11 @@ Foam::scalarList Foam::beadExchange::collect
 
     if (found != brought_)
     {
-        FatalErrorInFunction
-            << found << " of " << brought_ << " beads were found in the mesh"
-            << exit(FatalError);
+        besideSolver::fail
+        (
+            std::to_string(found) + " of " + std::to_string(brought_)
+          + " beads were found in the mesh"
+        );
     }
 
     return result;

@@ -205,21 +205,26 @@ Foam::vectorField Foam::latticeSampler<Interpolant>::spread
 
 
 template<class Interpolant>
+void Foam::latticeSampler<Interpolant>::look(const volVectorField& U)
+{
+    cells_.shallowCopy(U.primitiveField());
+    neighbours_ = lattice_.gather(U.primitiveField());
+}
+
+
+template<class Interpolant>
 Foam::scalarList Foam::latticeSampler<Interpolant>::sample
 (
-    const volVectorField& U,
     const ambient wanted,
     const beadExchange& beads
 ) const
 {
     static const Interpolant interpolant = Interpolant();
 
-    const vectorField& cells = U.primitiveField();
-    const List<vector> neighbours(lattice_.gather(cells));
     const stencil u
     {
         lattice_.slots().cdata(), lattice_.runs().cdata(), 0,
-        lattice_.strides(), cells.cdata(), neighbours.cdata(), cells.size()
+        lattice_.strides(), cells_.cdata(), neighbours_.cdata(), cells_.size()
     };
 
     scalarList values(beads.nPlaces()*(3 + components(wanted)));

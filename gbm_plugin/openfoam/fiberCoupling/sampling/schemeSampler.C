@@ -41,11 +41,11 @@ void interpolate
 
 Foam::scalarList Foam::schemeSampler::sample
 (
-    const volVectorField& U,
     const ambient wanted,
     const beadExchange& beads
 ) const
 {
+    const volVectorField& U = *U_;
     const label stride = 3 + components(wanted);
     scalarList values(beads.nPlaces()*stride);
     scalar* out = values.begin();
