@@ -86,7 +86,9 @@ class Fleet(Group):
         for f in scene.families:
             if removes_own(scene, f):
                 own = kernels(_mesh(scene, size, cut), scene.kinematic_viscosity, scene.density)
-                fleet._own[f.name] = OwnDisturbance(own, f.count * f.beads)
+                drag = 6 * np.pi * scene.dynamic_viscosity * f.radius
+                beads = f.count * f.beads
+                fleet._own[f.name] = OwnDisturbance(own, scene.kinematic_viscosity, drag, beads)
         return fleet
 
     @property

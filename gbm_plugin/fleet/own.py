@@ -16,6 +16,11 @@ d(k) being the weights of the gradient, ikw where it is exact: then, in steady f
 (4π/3) (a/Δx)³ of its spin T/8πμa³. |w|² and |d|² are means over the places of a bead between nodes. Taken together in
 shells of k these are sums of exponentials, each of which needs no history: integrated with the weights with which the
 flow itself takes forces (Adams–Bashforth, the first two steps Runge–Kutta).
+
+A bead that slips leaves its disturbance behind, where Δx times its slip s is not small beside ν. In Oseen's flow a mode
+has 1/(νk² + ik·s) in place of 1/νk², and the mean over directions is that of a rate νk²/g(s/νk),
+
+    g(q) = (3/2) [(1 + 1/q²) arctan(q)/q − 1/q²] for a force along the slip,   arctan(q)/q for a torque.
 """
 
 from __future__ import annotations
@@ -138,10 +143,20 @@ def _slopes(mesh: Mesh, phase: NDArray, seen: NDArray) -> tuple[NDArray, NDArray
     return slope * resolved, both * resolved
 
 
-class OwnDisturbance:
-    """That of beads (B, 3), from their forces and torques so far."""
+def _shared(left: NDArray) -> NDArray:
+    """g of s/νk (M, B, 2), for forces and torques."""
+    q = np.maximum(left, 1e-3)  # below it g is 1 to 1e-6
+    turned = np.arctan(q) / q
+    pushed = 1.5 * ((1 + 1 / q[..., 0] ** 2) * turned[..., 0] - 1 / q[..., 0] ** 2)
+    return np.stack([pushed, turned[..., 1]], axis=-1)
 
-    def __init__(self, kernels: tuple[Kernel, Kernel], beads: int):
+
+class OwnDisturbance:
+    """That of beads (B, 3), from their forces and torques so far. viscosity: kinematic; drag: 6πμa, over which a force
+    is the slip of its bead [kg/s]."""
+
+    def __init__(self, kernels: tuple[Kernel, Kernel], viscosity: float, drag: float, beads: int):
+        self._viscosity, self._drag = viscosity, drag
         self._weight, self._rate = (np.stack(a, axis=1)[:, None, :, None] for a in zip(*kernels, strict=True))
         self._parts = np.zeros((SHELLS, beads, 2, 3))
         self._loads: list[NDArray] = []  # (B, 2, 3), newest first
@@ -155,7 +170,9 @@ class OwnDisturbance:
         """One step, at whose start the beads put these (B, 3) on the flow; all steps are equal."""
         loads = np.stack([force, torque], axis=1)
         self._loads = [loads, *self._loads][:3]
-        fade = np.exp(-self._rate * time_step)
+        slip = np.linalg.norm(force, axis=1)[:, None] / self._drag
+        left = slip / np.sqrt(self._viscosity * self._rate[..., 0])  # s/νk, (M, B, 2)
+        fade = np.exp(-time_step * self._rate / _shared(left)[..., None])
         self._parts *= fade
         if len(self._loads) < 3:
             self._parts += time_step / 6 * (fade + 4 * np.sqrt(fade) + 1) * loads

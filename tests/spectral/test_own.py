@@ -11,37 +11,36 @@ from gbm_plugin.spectral import SpectralSolver
 BOX, NU = 2 * np.pi, 0.05
 
 
-def dragged(word, cells, speed, steps=300, scheme_steps=0.05):
-    """A bead dragged with a small force through a fluid at rest, at so many cells in a viscous time of a cell: what it
-    samples, and what is left without its own disturbance, both over the force."""
+def dragged(word, cells, speed, steps=200, scheme_steps=0.05):
+    """A bead dragged with a small force through a fluid at rest at speed ν/Δx, at so many steps in a viscous time of a
+    cell: what it samples along the force, and its own disturbance, both over the force; the last 60 steps."""
     cell = BOX / cells
     step = scheme_steps * cell**2 / NU
     solver = SpectralSolver(cells, NU, box=BOX, time_step=step, interpolation=word)
     mesh = Mesh(word, cell, BOX, (2 * solver.modes.cut + 1) / cells)
-    own = OwnDisturbance(kernels(mesh, NU, 1.0), 1)
+    drag = 1e-6 / (speed * NU / cell) if speed else np.inf
+    own = OwnDisturbance(kernels(mesh, NU, 1.0), NU, drag, 1)
     direction = np.array([[1.0, 0.3, 0.2]])
     direction /= np.linalg.norm(direction)
-    place, load, found = cell * np.array([[0.1, 0.2, 0.3]]), np.zeros((2, 1, 3)), []
-    load[0] = 1e-6 * direction
+    place, force, found = cell * np.array([[0.1, 0.2, 0.3]]), 1e-6 * direction, []
     for _ in range(steps):
-        u = solver.sample(place, solver.time, "velocity")[0]
-        found.append([np.linalg.norm(u), np.linalg.norm(u - own.motion[:, 0])])
-        solver.set_point_forces(place, load[0])
+        u, _ = solver.sample(place, solver.time, "velocity")
+        found.append([(u * direction).sum(), (own.motion[:, 0] * direction).sum()])
+        solver.set_point_forces(place, force)
         solver.advance(1)
-        own.advance(*load, step)
+        own.advance(force, 0 * force, step)
         place = place + speed * scheme_steps * cell * direction
-    return np.array(found).T * 1e6
+    return np.array(found[-60:]).T * 1e6
 
 
-@pytest.mark.parametrize(
-    ("word", "cells"), [("trilinear", 16), ("trilinear", 24), ("cubic", 16), ("exact", 12)]
-)
+@pytest.mark.parametrize(("word", "cells"), [("trilinear", 16), ("cubic", 12), ("exact", 12)])
 def test_a_dragged_bead_moves_as_in_an_unbounded_fluid(word, cells):
-    """At F/6πμa, but for a part of what it would find of itself, whatever the mesh: held in place 2 %, at a slip of a
-    tenth of ν/Δx a quarter (trilinear) and less."""
-    for speed, left in ((0.0, 0.02), (0.1, {"trilinear": 0.25}.get(word, 0.1))):
-        found, rest = dragged(word, cells, speed, steps=200)
-        assert rest.max() < left * found[-1]
+    """At F/6πμa, but for a part of what it would find of itself, whatever the mesh: held in place 2 %, at a slip that
+    is not small beside ν/Δx 7 % in the mean over places between nodes, of what is much less than that at rest."""
+    (rest, own), (moving, left) = (dragged(word, cells, speed).mean(axis=1) for speed in (0.0, 3.0))
+    assert own == pytest.approx(rest, rel=0.02)
+    assert left == pytest.approx(moving, rel=0.07)
+    assert moving < 0.7 * rest
 
 
 @pytest.mark.parametrize("word", ["trilinear", "cubic", "exact"])
@@ -51,7 +50,9 @@ def test_the_kernels_are_the_means_over_places_between_nodes(word):
     cell = BOX / cells
     step = 0.05 * cell**2 / NU
     solver = SpectralSolver(cells, NU, box=BOX, time_step=step, interpolation=word)
-    own = OwnDisturbance(kernels(Mesh(word, cell, BOX, (2 * solver.modes.cut + 1) / cells), NU, 1.0), 1)
+    own = OwnDisturbance(
+        kernels(Mesh(word, cell, BOX, (2 * solver.modes.cut + 1) / cells), NU, 1.0), NU, np.inf, 1
+    )
     load = np.array([[1.0, 0.3, 0.2]]) * 1e-6
     own.advance(load, load, step)
     start = solver.state()
@@ -105,19 +106,19 @@ def test_the_kernel_is_that_of_a_gaussian_for_a_gaussian(monkeypatch):
 
 def test_its_state_continues_it():
     k = kernels(Mesh("cubic", 0.1, 1.0), 0.01, 1.0)
-    whole, first = OwnDisturbance(k, 4), OwnDisturbance(k, 4)
+    whole, first = OwnDisturbance(k, 0.01, 0.1, 4), OwnDisturbance(k, 0.01, 0.1, 4)
     forces = np.random.default_rng(1).standard_normal((6, 2, 4, 3))
     for n, loads in enumerate(forces):
         whole.advance(*loads, 0.01)
         if n < 3:
             first.advance(*loads, 0.01)
-    second = OwnDisturbance(k, 4)
+    second = OwnDisturbance(k, 0.01, 0.1, 4)
     second.restore(first.state())
     for loads in forces[3:]:
         second.advance(*loads, 0.01)
     np.testing.assert_array_equal(second.motion, whole.motion)
     with pytest.raises(ValueError, match="own disturbance is"):
-        OwnDisturbance(k, 5).restore(first.state())
+        OwnDisturbance(k, 0.01, 0.1, 5).restore(first.state())
 
 
 def test_a_turning_solid_has_its_rotation():
