@@ -122,9 +122,11 @@ def on_grid(word: str, fields: NDArray, points: NDArray, threads: int | None = N
 
 
 @kernel
-def _spread_trilinear(values, points, nodes):
-    """The transpose of `trilinear`: nodes += values (P, m) by the weights of their points."""
+def _spread_trilinear(share, shares, values, points, nodes):
+    """The transpose of `trilinear`: nodes += values (P, m) by the weights of their points, in this share's layers of
+    nodes. Each takes the points in their order: the sums do not depend on the number of shares."""
     nx, ny, nz, fields = nodes.shape
+    first, last = part_of(share, shares, nx)
     for p in range(points.shape[0]):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
@@ -132,18 +134,23 @@ def _spread_trilinear(values, points, nodes):
         i0, j0, k0 = i % nx, j % ny, k % nz
         i1, j1, k1 = (i0 + 1) % nx, (j0 + 1) % ny, (k0 + 1) % nz
         for ix, wx in ((i0, 1 - a), (i1, a)):
+            if ix < first or ix >= last:
+                continue
             for jy, wy in ((j0, 1 - b), (j1, b)):
                 near, far = nodes[ix, jy, k0], nodes[ix, jy, k1]
-                for m in range(fields):
-                    value = wx * wy * values[p, m]
-                    near[m] += value * (1 - c)
-                    far[m] += value * c
+                plane = wx * wy
+                for m in range(0, fields, 3):  # a constant length, which the compiler unrolls
+                    for q in range(3):
+                        value = plane * values[p, m + q]
+                        near[m + q] += value * (1 - c)
+                        far[m + q] += value * c
 
 
 @kernel
-def _spread_lagrange(values, points, scale, nodes):
-    """The transpose of `lagrange`."""
+def _spread_lagrange(share, shares, values, points, scale, nodes):
+    """The transpose of `lagrange`, as above."""
     nx, ny, nz, fields = nodes.shape
+    first, last = part_of(share, shares, nx)
     width = scale.size
     weights, places = np.empty((3, width)), np.empty((3, width), np.intp)
     for p in range(points.shape[0]):
@@ -151,22 +158,36 @@ def _spread_lagrange(values, points, scale, nodes):
         _nearest(points[p, 1], ny, scale, weights[1], places[1])
         _nearest(points[p, 2], nz, scale, weights[2], places[2])
         for i in range(width):
+            if places[0, i] < first or places[0, i] >= last:
+                continue
             for j in range(width):
                 row, plane = nodes[places[0, i], places[1, j]], weights[0, i] * weights[1, j]
                 for k in range(width):
                     node, weight = row[places[2, k]], plane * weights[2, k]
-                    for m in range(fields):
-                        node[m] += weight * values[p, m]
+                    for m in range(0, fields, 3):
+                        for q in range(3):
+                            node[m + q] += weight * values[p, m + q]
 
 
-def spread(word: str, values: NDArray, points: NDArray, cells: tuple[int, int, int]) -> NDArray:
-    """Fields (m, *cells) of values (P, m) at points, by the transpose of `on_grid`: for all fields g, sum of (fields g)
-    = sum of values times on_grid(word, g, points). In the order of `for_sampling`; added up in that of the points."""
-    nodes = np.zeros((*cells, values.shape[1]))
+def spread(
+    word: str,
+    values: NDArray,
+    points: NDArray,
+    cells: tuple[int, int, int],
+    threads: int | None = None,
+    out: NDArray | None = None,
+) -> NDArray:
+    """Fields (m, *cells) of values (P, m), m = 3, 6, ..., at points, by the transpose of `on_grid`: for all fields g,
+    sum of (fields g) = sum of values times on_grid(word, g, points). In the order of `for_sampling`, as `out` must be,
+    where it is given to be written; added up in the order of the points."""
+    nodes = np.empty((*cells, values.shape[1])) if out is None else np.moveaxis(out, 0, -1)
+    nodes[:] = 0
+    work = COST[word] * len(points)
     if word == "trilinear":
-        _spread_trilinear(only_read(values), only_read(points), nodes)
+        in_shares(_spread_trilinear, work, only_read(values), only_read(points), nodes, most=threads)
     else:
-        _spread_lagrange(only_read(values), only_read(points), _scale(word), nodes)
+        own = (only_read(values), only_read(points), _scale(word))
+        in_shares(_spread_lagrange, work, *own, nodes, most=threads)
     return np.moveaxis(nodes, -1, 0)
 
 

@@ -78,6 +78,10 @@ class Arrays:
         out[:, 0, 0, 0] = 0
         return out
 
+    def loads(self, modes: Array) -> Array:
+        """P [F + curl T/2] without its mean, of the modes of forces F (3, ...), or of F and torques T (6, ...)."""
+        return self.project(modes if len(modes) == 3 else modes[:3] + self.curl(modes[3:]) / 2)
+
     def nonlinear(self, u: Array, out: Array, linear: float = 0.0, want_speed: bool = False) -> None:
         """out = P [-div(u u) + linear u]; on request also max_speed = max(|u_x| + |u_y| + |u_z|)."""
         x, y, z = self.to_physical(u)

@@ -14,10 +14,18 @@ def on_grid(word: str, fields: NDArray, positions: NDArray, box: float, threads:
     return grid.on_grid(word, fields, positions * (fields.shape[1] / box), threads)
 
 
-def spread_on_grid(word: str, values: NDArray, positions: NDArray, box: float, cells: int) -> NDArray:
-    """Densities (m, n, n, n) of point values (P, m), by the transpose of `on_grid`."""
-    per_cell = grid.spread(word, values, positions * (cells / box), (cells, cells, cells))
-    return per_cell * (cells / box) ** 3
+def spread_on_grid(
+    word: str,
+    values: NDArray,
+    positions: NDArray,
+    box: float,
+    cells: int,
+    threads: int = 1,
+    out: NDArray | None = None,
+) -> NDArray:
+    """Densities (m, n, n, n) of point values (P, m), by the transpose of `on_grid`; out: as in `grid.spread`."""
+    scale = cells / box
+    return grid.spread(word, values * scale**3, positions * scale, (cells, cells, cells), threads, out)
 
 
 def fourier_spread(values: NDArray, positions: NDArray, box: float, cut: int, threads: int = 1) -> NDArray:

@@ -66,6 +66,41 @@ def split(planes, first, out):
 
 
 @jit
+def join(fields, first, planes):
+    """The inverse of `split`; fields beyond those given become 0, up to three."""
+    for pair in range(planes.shape[0]):
+        x = first + 2 * pair
+        for c in range(fields.shape[0], 3):
+            planes[pair, c] = 0
+        for j in range(fields.shape[2]):
+            for m in range(fields.shape[3]):
+                for c in range(fields.shape[0]):
+                    planes[pair, c, j, m] = complex(fields[c, x, j, m], fields[c, x + 1, j, m])
+
+
+@jit
+def loads(modes, out, kx, ky, kz, start, stop):
+    """out = P [F + ik x T/2] without its mean, for kx from start to stop; modes: of F, and where there are six of T."""
+    for i in range(start, stop):
+        for j in range(ky.size):
+            a, b = kx[i], ky[j]
+            for m in range(kz.size):
+                c = kz[m]
+                x, y, z = modes[0, i, j, m], modes[1, i, j, m], modes[2, i, j, m]
+                if modes.shape[0] == 6:
+                    r, s, t = modes[3, i, j, m], modes[4, i, j, m], modes[5, i, j, m]
+                    u, v, w = b * t - c * s, c * r - a * t, a * s - b * r
+                    x += complex(-u.imag / 2, u.real / 2)
+                    y += complex(-v.imag / 2, v.real / 2)
+                    z += complex(-w.imag / 2, w.real / 2)
+                square = a * a + b * b + c * c
+                if square == 0:
+                    continue
+                q = (a * x + b * y + c * z) / square
+                out[0, i, j, m], out[1, i, j, m], out[2, i, j, m] = x - a * q, y - b * q, z - c * q
+
+
+@jit
 def products(planes, width):
     """Replace u, v, w in planes (pairs, 5, n, *), a real view, by u^2 - w^2, v^2 - w^2, uv, uw, vw."""
     for pair in range(planes.shape[0]):

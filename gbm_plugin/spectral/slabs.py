@@ -84,6 +84,40 @@ class Slabs(Arrays):
             self._each_block(split)
         return out
 
+    def to_modes(self, fields):
+        n, cut = self.modes.cells, self.modes.cut
+        out = np.empty((len(fields), *self.modes.shape), self.complex)
+        factor = self.complex.type(0.5j / n**3)
+        for first in range(0, len(fields), 3):
+            part = np.asarray(fields[first : first + 3])
+            count = len(part)
+            mixed, target = self._mixed[:count], out[first : first + count]
+
+            def join(worker, x, planes, part=part, mixed=mixed):
+                kernels.join(part, x, planes)
+                worker.forward(len(planes), 3)
+                kernels.unpack(planes, mixed, x, self._rows)
+
+            def finish(worker, start, stop, mixed=mixed, target=target):
+                buffer = worker.columns[: len(mixed), :, : stop - start, : cut + 1]
+                buffer[:] = mixed[:, :, start:stop]
+                worker.forward_fields.execute()
+                np.multiply(buffer[:, : cut + 1], factor, out=target[:, : cut + 1, start:stop])
+                np.multiply(buffer[:, -cut:], factor, out=target[:, cut + 1 :, start:stop])
+
+            self._each_block(join)
+            self._each_column_block(finish)
+        return out
+
+    def loads(self, modes):
+        out = self.zeros()
+
+        def part(worker, start, stop):
+            kernels.loads(modes, out, *self._k, start, stop)
+
+        self._share(part, len(out[0]))
+        return out
+
     def combine(self, out: np.ndarray, terms: list[Term]) -> float:
         axes = [k.astype(float) ** 2 for k in self._k]
         axes[2] = np.repeat(axes[2], 2)  # real and imaginary part
@@ -173,29 +207,27 @@ class _Worker:
         self.planes = pyfftw.zeros_aligned((pairs, 5, n, width), kind)
         self.inverse_x = _plan(self.columns[:3], 1, "FFTW_BACKWARD")
         self.forward_x = _plan(self.columns, 1, "FFTW_FORWARD")
-        self._plans: dict[int, tuple[list, list]] = {}
+        self.forward_fields = _plan(self.columns[:3], 1, "FFTW_FORWARD")
+        self._plans: dict[tuple[int, int, str], list] = {}
         self._edges, self._n = (slice(0, kept), slice(n - kept, n)), n
 
-    def _for(self, pairs: int) -> tuple[list, list]:
-        if pairs not in self._plans:
-            z = self.planes[:pairs, ..., : self._n]
-
-            def along(fields, direction):
-                part = z[:, :fields]
-                return [_plan(part[..., e], 2, direction) for e in self._edges], _plan(part, 3, direction)
-
-            y, rows = along(3, "FFTW_BACKWARD")
-            inverse = [*y, rows]
-            y, rows = along(5, "FFTW_FORWARD")
-            self._plans[pairs] = inverse, [rows, *y]
-        return self._plans[pairs]
+    def _for(self, pairs: int, fields: int, direction: str) -> list:
+        """Plans for so many plane pairs and fields: along y where modes are kept, and along z."""
+        key = (pairs, fields, direction)
+        if key not in self._plans:
+            z = self.planes[:pairs, :fields, :, : self._n]
+            along_y = [_plan(z[..., e], 2, direction) for e in self._edges]
+            along_z = _plan(z, 3, direction)
+            back = direction == "FFTW_BACKWARD"
+            self._plans[key] = [*along_y, along_z] if back else [along_z, *along_y]
+        return self._plans[key]
 
     def inverse(self, pairs: int) -> None:
-        for plan in self._for(pairs)[0]:
+        for plan in self._for(pairs, 3, "FFTW_BACKWARD"):
             plan.execute()
 
-    def forward(self, pairs: int) -> None:
-        for plan in self._for(pairs)[1]:
+    def forward(self, pairs: int, fields: int = 5) -> None:
+        for plan in self._for(pairs, fields, "FFTW_FORWARD"):
             plan.execute()
 
 

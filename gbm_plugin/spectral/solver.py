@@ -75,6 +75,7 @@ class SpectralSolver:
         self._u = self.operators.zeros()
         self._energy = 0.0
         self._points: Array | None = None  # modes of the point forces
+        self._densities: NDArray | None = None  # of these at the nodes, to be written over
         self._pushes: deque[float] = deque(maxlen=3)  # rms of these in the last steps
         self._fields: dict[str, Array] = {}  # physical fields of the present time
         self._spare: dict[str, Array] = {}  # those of the past, to be written over
@@ -148,10 +149,13 @@ class SpectralSolver:
             modes = interpolate.fourier_spread(values, points, self.box, self.modes.cut, self._threads)
             modes = operators.xp.asarray(modes, operators.complex)
         else:
-            spread = (self.interpolation, values, points, self.box, self.cells)
+            n = self.cells
+            if self._densities is None or len(self._densities) != values.shape[1]:
+                nodes = np.empty((n, n, n, values.shape[1]), operators.real)
+                self._densities = np.moveaxis(nodes, -1, 0)
+            spread = (self.interpolation, values, points, self.box, n, self._threads, self._densities)
             modes = operators.to_modes(interpolate.spread_on_grid(*spread))
-        total = modes[:3] if torque is None else modes[:3] + operators.curl(modes[3:]) / 2
-        self._points = operators.project(total)
+        self._points = operators.loads(modes)
 
     def advance(self, steps: int = 1) -> None:
         """Take time steps."""

@@ -55,6 +55,17 @@ def test_a_couple_spins_the_fluid_as_two_forces_do():
     assert np.abs(pairs - couple).max() < 1e-3 * np.abs(couple).max()
 
 
+def test_threads_change_no_bit():
+    """Each thread adds to layers of its own, in the order of the points."""
+    x, force, torque = free_loads(20_000)
+    found = []
+    for threads in (1, 3):
+        solver = SpectralSolver(16, 0.01, box=3.0, time_step=0.01, interpolation="cubic", threads=threads)
+        solver.set_point_forces(x, force, torque)
+        found.append(solver._points)
+    np.testing.assert_array_equal(*found)
+
+
 def test_no_points_no_change():
     flows = []
     for forces in (None, np.zeros((1, 3))):
