@@ -23,7 +23,7 @@ from .ab3 import turn_links
 from .ambient import SAMPLES
 from .blocks import Ahead, Chain, Flow, Motion, rows_of, take
 from .mobility import work_rows
-from .simd import LANES, add, add_scaled, dot, load, load3, smaller, splat, sqrt, store
+from .simd import LANES, add, add_scaled, dot, larger, load, load3, smaller, splat, sqrt, store
 
 D = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)
@@ -41,17 +41,19 @@ class Ends(NamedTuple):
 
 class Pace(NamedTuple):
     """Per fiber, (F,): trial, the step to try; elapsed, step, error: time reached in the flow step, suggested next
-    step, and error estimate."""
+    step, and error estimate; tension: largest |e·λ| of the links at the time reached."""
 
     trial: np.ndarray
     elapsed: np.ndarray
     step: np.ndarray
     error: np.ndarray
+    tension: np.ndarray
 
 
 class _Parts(NamedTuple):
     """Scratch: links and multipliers of eight fibers, and their samples; velocity and rotation of a stage; links in
-    the middle and at the end; k₁, k₂, k₃; κ; multipliers; weights of samples; h, β and the estimate."""
+    the middle and at the end; k₁, k₂, k₃; κ; multipliers; weights of samples; h, β, the estimate and
+    the tension."""
 
     own: Any
     mine: Any
@@ -84,7 +86,7 @@ def layout(work, beads):
     history, at = take(work, at, rows)
     tension, at = take(work, at, rows - 3)
     weights, at = take(work, at, SAMPLES)
-    sizes, at = take(work, at, 3)
+    sizes, at = take(work, at, 4)
     parts = _Parts(
         own, mine, velocities, rotations, velocity, rotation, middle, new, k, history, tension, weights, sizes
     )
@@ -148,7 +150,7 @@ def _attempt(stage, share, shares, material, members, samples, tolerance, before
     """
     law, radius, beta = material
     out, out_lagged, times = after.links, after.multipliers, samples.times
-    trial, elapsed, step, error = pace
+    trial, elapsed, step, error, pulls = pace
     rows = out.shape[1]
     links = rows // 3 - 1
     parts, used = layout(scratch[share], links + 1)
@@ -200,11 +202,14 @@ def _attempt(stage, share, shares, material, members, samples, tolerance, before
             if s < 2:
                 at = middle if s == 0 else new
                 turn_links(now, rates, (0.5 if s == 0 else 1.0) * h, at)
-        total = splat(0.0)
+        total, pull = splat(0.0), splat(0.0)
         for i in range(links):
             gap = add_scaled(add(load3(k1, i), load3(k3, i)), -2.0, load3(k2, i))
             total = total + dot(gap, gap)
+            along = dot(load3(new, i), load3(tension, i))
+            pull = larger(along * along, pull)
         store(sizes, 2, (1.0 / 6.0) * h * sqrt((1.0 / links) * total))
+        store(sizes, 3, sqrt(pull))
         for lane in range(min(LANES, len(members) - group * LANES)):
             fiber, estimate, size = eight[lane], sizes[2, lane], sizes[0, lane]
             b, place = fiber // LANES, fiber % LANES
@@ -216,6 +221,7 @@ def _attempt(stage, share, shares, material, members, samples, tolerance, before
             accepted = estimate <= tolerance
             if accepted:
                 elapsed[fiber] += size
+                pulls[fiber] = sizes[3, lane]
             source, contact = (new, tension) if accepted else (now, lag)
             for row in range(rows):
                 out[b, row, place] = source[row, lane]

@@ -1,6 +1,6 @@
 """3×3 matrices of lanes: tuples of nine, row by row; symmetric ones of six (xx, xy, xz, yy, yz, zz)."""
 
-from .simd import arithmetic, dot
+from .simd import arithmetic, cross, dot
 
 
 @arithmetic
@@ -124,3 +124,46 @@ def apply_symmetric(s, v):
         s[1] * v[0] + s[3] * v[1] + s[4] * v[2],
         s[2] * v[0] + s[4] * v[1] + s[5] * v[2],
     )
+
+
+@arithmetic
+def plus(a, b):
+    """a + b, of as many numbers each."""
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+@arithmetic
+def minus(a, b):
+    """a − b, of as many numbers each."""
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+@arithmetic
+def scaled(c, m):
+    """c m."""
+    return tuple(c * x for x in m)
+
+
+@arithmetic
+def minus_product_transposed(m, a, b):
+    """m − a bᵀ."""
+    return minus_product(m, a, (b[0], b[3], b[6], b[1], b[4], b[7], b[2], b[5], b[8]))
+
+
+@arithmetic
+def minus_transposed_product(m, a, b):
+    """m − aᵀ b."""
+    return minus_product(m, (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]), b)
+
+
+@arithmetic
+def cross_symmetric(e, s):
+    """[e]× S, S symmetric: e × each column."""
+    columns = cross(e, s[0:3]), cross(e, (s[1], s[3], s[4])), cross(e, (s[2], s[4], s[5]))
+    return tuple(columns[j][i] for i in range(3) for j in range(3))
+
+
+@arithmetic
+def times_cross(m, e):
+    """m [e]×: each row × e."""
+    return (*cross(m[0:3], e), *cross(m[3:6], e), *cross(m[6:9], e))

@@ -5,9 +5,18 @@ Tensors of Wajnryb, Mizerski, Zuk & Szymczak (2013) and Zuk et al. (2014) for eq
 scaled by 1/6πμa and torques T by 1/6πμa², so that all are velocities, and spins are times a. With r in
 units of a and n from bead j to bead i,
 
-    v_i = (A I + B n nᵀ) F_j + q T_j × n,       a ω_i = q F_j × n + ¾ (C I + D n nᵀ) T_j.
+    v_i = V F_j + T_j × Q,      V = A I + B n nᵀ,        Q = q n,
+    a ω_i = F_j × Q + R T_j,    R = ¾ (C I + D n nᵀ).
 
 All are continuous at contact, and the whole mobility is symmetric positive definite for any positions.
+
+A contact force f of link k pushes bead k with f, bead k + 1 with −f, and turns both with e_k × f. The slip of link i,
+v_i − v_(i+1) − e_i × a(ω_i + ω_(i+1)), is then
+
+    [V" + (e_k·Q' − e_i·Q*) I − e_k Q'ᵀ + Q* e_iᵀ − [e_i]× R" [e_k]×] f,
+
+V" the second difference of V over the beads of both links, R" the sum of R, Q' the difference of Q over the beads of
+i summed over those of k, and Q* its sum over the beads of i, of the difference over those of k.
 """
 
 from typing import Any, NamedTuple
@@ -18,6 +27,19 @@ from ..compiled import inlined, part
 from .bending import moment, rod_factor
 from .blocks import take
 from .layout import difference, mean_vector
+from .matrix3 import (
+    apply_symmetric,
+    cross_symmetric,
+    identity_plus,
+    minus,
+    minus_product,
+    minus_product_transposed,
+    minus_transposed_product,
+    plus,
+    plus_outer,
+    scaled,
+    times_cross,
+)
 from .simd import (
     add,
     add_scaled,
@@ -27,22 +49,36 @@ from .simd import (
     larger,
     load,
     load3,
+    load6,
     scale,
     select_less,
     splat,
     sqrt,
     store,
     store3,
+    store6,
     subtract,
     zero3,
 )
 
-COEFFICIENTS = 8  # per pair: A, B, q, C, D, n
+
+@arithmetic
+def _isotropic_plus(alpha, b, n):
+    """α I + b n nᵀ, symmetric."""
+    p = scale(b, n)
+    return (
+        alpha + p[0] * n[0],
+        p[0] * n[1],
+        p[0] * n[2],
+        alpha + p[1] * n[1],
+        p[1] * n[2],
+        alpha + p[2] * n[2],
+    )
 
 
 @arithmetic
 def pair(x):
-    """A, B, q, C, D and n of two spheres a distance x apart, in units of a."""
+    """V, R and Q of two spheres a distance x apart, in units of a."""
     square = larger(dot(x, x), 1e-24)
     r = sqrt(square)
     i = 1.0 / r
@@ -53,37 +89,45 @@ def pair(x):
     q = select_less(r, far, 0.375 * r - 9.0 / 64.0 * square, 0.75 * i * i)
     c = select_less(r, far, 1.0 - 27.0 / 32.0 * r + 5.0 / 64.0 * r3, -0.5 * i3)
     d = select_less(r, far, 9.0 / 32.0 * r - 3.0 / 64.0 * r3, 1.5 * i3)
-    return a, b, q, c, d, scale(i, x)
+    n = scale(i, x)
+    return _isotropic_plus(a, b, n), _isotropic_plus(0.75 * c, 0.75 * d, n), scale(q, n)
+
+
+class Pairs(NamedTuple):
+    """V, R and Q of all beads i ≥ j, and per bead the sums of V and Q over all i."""
+
+    translation: Any
+    rotation: Any
+    coupling: Any
+    all_translation: Any
+    all_coupling: Any
 
 
 @inlined
-def _load_pair(pairs, i, j):
-    """A, B, q, C, D of beads i ≠ j, and the direction from j to i."""
+def _place(i, j):
     high, low = max(i, j), min(i, j)
-    p = COEFFICIENTS * (high * (high - 1) // 2 + low)
-    sign = 1.0 if i > j else -1.0
-    n = sign * load(pairs, p + 5), sign * load(pairs, p + 6), sign * load(pairs, p + 7)
-    return load(pairs, p), load(pairs, p + 1), load(pairs, p + 2), load(pairs, p + 3), load(pairs, p + 4), n
+    return high * (high + 1) // 2 + low
+
+
+@inlined
+def _coupling(coupling, i, j):
+    """Q, from bead j to bead i."""
+    return scale(1.0 if i > j else -1.0, load3(coupling, _place(i, j)))
 
 
 @inlined
 def response(pairs, i, j, force, torque):
     """Velocity and spin of bead i from force and torque on bead j."""
-    if i == j:
-        return force, scale(0.75, torque)
-    a, b, q, c, d, n = _load_pair(pairs, i, j)
-    velocity = add_scaled(scale(a, force), b * dot(n, force), n)
-    spin = add_scaled(scale(0.75 * c, torque), 0.75 * d * dot(n, torque), n)
-    return add_scaled(velocity, q, cross(torque, n)), add_scaled(spin, q, cross(force, n))
+    place, q = _place(i, j), _coupling(pairs.coupling, i, j)
+    velocity = add(apply_symmetric(load6(pairs.translation, place), force), cross(torque, q))
+    return velocity, add(apply_symmetric(load6(pairs.rotation, place), torque), cross(force, q))
 
 
 @inlined
-def torque_response(pairs, i, j, torque):
+def torque_response(rotation, coupling, i, j, torque):
     """Velocity and spin of bead i from a torque on bead j."""
-    if i == j:
-        return zero3(), scale(0.75, torque)
-    _, _, q, c, d, n = _load_pair(pairs, i, j)
-    return scale(q, cross(torque, n)), add_scaled(scale(0.75 * c, torque), 0.75 * d * dot(n, torque), n)
+    spin = apply_symmetric(load6(rotation, _place(i, j)), torque)
+    return cross(torque, _coupling(coupling, i, j)), spin
 
 
 class _Parts(NamedTuple):
@@ -99,14 +143,13 @@ class _Parts(NamedTuple):
 
 class _StageParts(NamedTuple):
     """More scratch of a stage: response of the gaps to joint moments, the joints' matrix and moments; gaps without
-    bending, gaps ahead, one column; slips and gaps of three columns at once."""
+    bending, gaps ahead; slips and gaps of three columns at once."""
 
     bending: Any
     matrix: Any
     moments: Any
     free: Any
     ahead: Any
-    column: Any
     slips: Any
     columns: Any
 
@@ -114,13 +157,18 @@ class _StageParts(NamedTuple):
 @register_jitable
 def layout(work, beads):
     """The parts of scratch for the rates of fibers of so many beads."""
-    n = 3 * (beads - 1)
-    pairs, at = take(work, 0, COEFFICIENTS * beads * (beads - 1) // 2)
+    n, count = 3 * (beads - 1), beads * (beads + 1) // 2
+    translation, at = take(work, 0, 6 * count)
+    rotation, at = take(work, at, 6 * count)
+    coupling, at = take(work, at, 3 * count)
+    all_translation, at = take(work, at, 6 * beads)
+    all_coupling, at = take(work, at, 3 * beads)
     factor, at = take(work, at, n * n)
     gaps, at = take(work, at, (n + 3) * n)
     v, at = take(work, at, n + 3)
     s, at = take(work, at, n + 3)
     torques, at = take(work, at, n + 3)
+    pairs = Pairs(translation, rotation, coupling, all_translation, all_coupling)
     return _Parts(pairs, factor, gaps, v, s, torques), at
 
 
@@ -134,10 +182,9 @@ def stage_layout(work, beads):
     moments, at = take(work, at, m)
     free, at = take(work, at, n + 3)
     ahead, at = take(work, at, n)
-    column, at = take(work, at, n + 3)
     slips, at = take(work, at, 3 * n)
     columns, at = take(work, at, 3 * (n + 3))
-    return (parts, _StageParts(bending, matrix, moments, free, ahead, column, slips, columns)), at
+    return (parts, _StageParts(bending, matrix, moments, free, ahead, slips, columns)), at
 
 
 @inlined
@@ -162,61 +209,157 @@ def _dot_rows(a, first_a, stride, b, first_b, count):
     return (s0 + s1) + (s2 + s3)
 
 
+# matrices of scratch, row by row, in blocks of 3 × 3; `blocks`: of which each row has so many
+
+
+@inlined
+def _block(matrix, blocks, i, k):
+    a = load3(matrix, 3 * i * blocks + k)
+    b = load3(matrix, (3 * i + 1) * blocks + k)
+    c = load3(matrix, (3 * i + 2) * blocks + k)
+    return a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]
+
+
+@inlined
+def _store_block(matrix, blocks, i, k, m):
+    store3(matrix, 3 * i * blocks + k, (m[0], m[1], m[2]))
+    store3(matrix, (3 * i + 1) * blocks + k, (m[3], m[4], m[5]))
+    store3(matrix, (3 * i + 2) * blocks + k, (m[6], m[7], m[8]))
+
+
+@arithmetic
+def _gap(v, alpha, e, q):
+    """−(V + α I − e qᵀ), V symmetric: of v_(i+1) − v_i where v_i − v_(i+1) = V f + (e × f) × q, α = e·q."""
+    m = identity_plus(alpha, scale(-1.0, e), q)
+    full = v[0], v[1], v[2], v[1], v[3], v[4], v[2], v[4], v[5]
+    return tuple(-1.0 * a - b for a, b in zip(full, m, strict=True))
+
+
+@arithmetic
+def _turned(q):
+    """The matrix of T × q, of a torque T."""
+    return 0.0, q[2], -1.0 * q[1], -1.0 * q[2], 0.0, q[0], q[1], -1.0 * q[0], 0.0
+
+
+@inlined
+def _differences(v, r, q, i, k):
+    """V", R", Q' and Q* of links i ≥ k, of V, R and Q of all pairs."""
+    a, b = _place(i, k), _place(i, k + 1)
+    c, d = _place(i + 1, k), _place(i + 1, k + 1)
+    translation = minus(plus(load6(v, a), load6(v, d)), plus(load6(v, b), load6(v, c)))
+    rotation = plus(plus(load6(r, a), load6(r, d)), plus(load6(r, b), load6(r, c)))
+    straight = subtract(_coupling(q, i, k), _coupling(q, i + 1, k + 1))
+    across = subtract(_coupling(q, i + 1, k), _coupling(q, i, k + 1))
+    return translation, rotation, subtract(straight, across), add(straight, across)
+
+
 @part
-def assemble(state, pairs, factor, gaps, v, s):
+def _fill(state, pairs):
+    """V, R and Q of all pairs, and their sums."""
+    beads = state.shape[0] // 3
+    translation, rotation, coupling, all_translation, all_coupling = pairs
+    one, none, spin = splat(1.0), splat(0.0), splat(0.75)
+    for i in range(beads):
+        first = i * (i + 1) // 2
+        store6(translation, first + i, (one, none, none, one, none, one))
+        store6(rotation, first + i, (spin, none, none, spin, none, spin))
+        store3(coupling, first + i, zero3())
+        total, sums, x = (one, none, none, one, none, one), zero3(), zero3()
+        for j in range(i - 1, -1, -1):  # from the nearest bead on: x = r_i − r_j
+            x = add_scaled(x, 2.0, load3(state, j))
+            v, r, q = pair(x)
+            store6(translation, first + j, v)
+            store6(rotation, first + j, r)
+            store3(coupling, first + j, q)
+            store6(all_translation, j, plus(load6(all_translation, j), v))
+            store3(all_coupling, j, add(load3(all_coupling, j), q))
+            total, sums = plus(total, v), subtract(sums, q)
+        store6(all_translation, i, total)
+        store3(all_coupling, i, sums)
+
+
+@arithmetic
+def _cholesky(m):
+    """L of m = L Lᵀ, its diagonal inverted."""
+    d0 = 1.0 / sqrt(m[0])
+    l10, l20 = m[3] * d0, m[6] * d0
+    d1 = 1.0 / sqrt(m[4] - l10 * l10)
+    l21 = (m[7] - l20 * l10) * d1
+    d2 = 1.0 / sqrt(m[8] - l20 * l20 - l21 * l21)
+    return d0, 0.0, 0.0, l10, d1, 0.0, l20, l21, d2
+
+
+@arithmetic
+def _divided(m, corner):
+    """m L⁻ᵀ, L as _cholesky gives it."""
+    rows: tuple = ()
+    for r in (0, 3, 6):
+        x = m[r] * corner[0]
+        y = (m[r + 1] - x * corner[3]) * corner[4]
+        rows += (x, y, (m[r + 2] - x * corner[6] - y * corner[7]) * corner[8])
+    return rows
+
+
+@arithmetic
+def _forward(corner, m):
+    """L⁻¹ m."""
+    x = scale(corner[0], m[0:3])
+    y = scale(corner[4], add_scaled(m[3:6], -1.0 * corner[3], x))
+    z = scale(corner[8], add_scaled(add_scaled(m[6:9], -1.0 * corner[6], x), -1.0 * corner[7], y))
+    return (*x, *y, *z)
+
+
+@arithmetic
+def _backward(corner, m):
+    """L⁻ᵀ m."""
+    z = scale(corner[8], m[6:9])
+    y = scale(corner[4], add_scaled(m[3:6], -1.0 * corner[7], z))
+    x = scale(corner[0], add_scaled(add_scaled(m[0:3], -1.0 * corner[3], y), -1.0 * corner[6], z))
+    return (*x, *y, *z)
+
+
+@part
+def assemble(state, pairs, factor, gaps):
     """Cholesky factor (lower, its diagonal inverted) of the constraint matrix, and gaps from multipliers.
 
     Column 3k + c of gaps (3N, 3(N−1)) holds, for a unit multiplier of link k, all v_(i+1) − v_i and the
     mean v.
     """
     links = state.shape[0] // 3 - 1
-    n = 3 * links
-    p = 0
-    for i in range(1, links + 1):
-        x = zero3()
-        for j in range(i - 1, -1, -1):  # from the nearest bead on: x = r_i − r_j
-            x = add_scaled(x, 2.0, load3(state, j))
-            a, b, q, c, d, unit = pair(x)
-            at = COEFFICIENTS * (p + j)
-            store(pairs, at, a)
-            store(pairs, at + 1, b)
-            store(pairs, at + 2, q)
-            store(pairs, at + 3, c)
-            store(pairs, at + 4, d)
-            store(pairs, at + 5, unit[0])
-            store(pairs, at + 6, unit[1])
-            store(pairs, at + 7, unit[2])
-        p += i
-    one, none = splat(1.0), splat(0.0)
+    share = 1.0 / (links + 1)
+    translation, rotation, coupling, all_translation, all_coupling = pairs
+    _fill(state, pairs)
     for k in range(links):
         e = load3(state, k)
-        for c in range(3):
-            force = (one if c == 0 else none, one if c == 1 else none, one if c == 2 else none)
-            torque = cross(e, force)
-            back = scale(-1.0, force)
-            for i in range(links + 1):
-                v1, s1 = response(pairs, i, k, force, torque)
-                v2, s2 = response(pairs, i, k + 1, back, torque)
-                store3(v, i, add(v1, v2))
-                store3(s, i, add(s1, s2))
-            column = 3 * k + c
-            for i in range(links):
-                gap = difference(v, i)
-                for d in range(3):
-                    store(gaps, (3 * i + d) * n + column, gap[d])
-                if i >= k:
-                    slip = _slip(state, v, s, i)
-                    for d in range(3):
-                        store(factor, (3 * i + d) * n + column, slip[d])
-            mean = mean_vector(v, links + 1)
-            for d in range(3):
-                store(gaps, (n + d) * n + column, mean[d])
-    for j in range(n):
-        inverse = 1.0 / sqrt(load(factor, j * n + j) - _dot_rows(factor, j * n, 1, factor, j * n, j))
-        store(factor, j * n + j, inverse)
-        for i in range(j + 1, n):
-            rest = load(factor, i * n + j) - _dot_rows(factor, i * n, 1, factor, j * n, j)
-            store(factor, i * n + j, rest * inverse)
+        for i in range(k, links):
+            own = load3(state, i)
+            v, r, before, after = _differences(translation, rotation, coupling, i, k)
+            alpha, beta = dot(e, before), dot(own, after)
+            gap = _gap(v, alpha, e, before)
+            _store_block(gaps, links, k, i, _gap(v, -1.0 * beta, own, scale(-1.0, after)))
+            _store_block(gaps, links, i, k, gap)
+            turned = times_cross(cross_symmetric(own, r), e)
+            _store_block(factor, links, i, k, _slip_block(gap, beta, after, own, turned))
+        force = minus(load6(all_translation, k + 1), load6(all_translation, k))
+        torque = scale(-1.0, add(load3(all_coupling, k), load3(all_coupling, k + 1)))
+        mean = _gap(force, dot(e, torque), e, torque)
+        _store_block(gaps, links, links, k, scaled(share, mean))
+    for k in range(links):
+        for i in range(k, links):
+            m = _block(factor, links, i, k)
+            for j in range(k):
+                m = minus_product_transposed(m, _block(factor, links, i, j), _block(factor, links, k, j))
+            if i == k:
+                _store_block(factor, links, k, k, _cholesky(m))
+            else:
+                _store_block(factor, links, i, k, _divided(m, _block(factor, links, k, k)))
+
+
+@arithmetic
+def _slip_block(gap, beta, after, e, turned):
+    """−gap − β I + Q* e_iᵀ − [e_i]× R" [e_k]×."""
+    m = identity_plus(-1.0 * beta, after, e)
+    return tuple(a - b - c for a, b, c in zip(m, gap, turned, strict=True))
 
 
 @part
@@ -240,42 +383,36 @@ def roll(state, factor, gaps, v, s, multipliers, out):
         store(out, row, load(out, row) + _dot_rows(gaps, row * n, 1, multipliers, 0, n))
 
 
-@inlined
-def _dot_columns(a, first, stride, x, begin, count):
-    """Σ a[first + k stride] x[begin + k] for three columns at once, row by row in x."""
-    even, odd = zero3(), zero3()
-    twos = count - count % 2
-    for k in range(0, twos, 2):
-        at = first + k * stride
-        even = add_scaled(even, load(a, at), load3(x, begin + k))
-        odd = add_scaled(odd, load(a, at + stride), load3(x, begin + k + 1))
-    if count > twos:
-        even = add_scaled(even, load(a, first + twos * stride), load3(x, begin + twos))
-    return add(even, odd)
-
-
 @part
-def _roll_columns(factor, gaps, n, x, out):
+def _roll_columns(factor, gaps, links, x, out):
     """As roll for three columns at once: x, their slips, is overwritten; out, their gaps, is completed."""
-    for i in range(n):
-        rest = subtract(load3(x, i), _dot_columns(factor, i * n, 1, x, 0, i))
-        store3(x, i, scale(load(factor, i * n + i), rest))
-    for back in range(n):
-        i = n - 1 - back
-        rest = subtract(load3(x, i), _dot_columns(factor, (i + 1) * n + i, n, x, i + 1, back))
-        store3(x, i, scale(load(factor, i * n + i), rest))
-    for row in range(n + 3):
-        store3(out, row, subtract(load3(out, row), _dot_columns(gaps, row * n, 1, x, 0, n)))
+    for i in range(links):
+        m = _block(x, 1, i, 0)
+        for k in range(i):
+            m = minus_product(m, _block(factor, links, i, k), _block(x, 1, k, 0))
+        _store_block(x, 1, i, 0, _forward(_block(factor, links, i, i), m))
+    for back in range(links):
+        i = links - 1 - back
+        m = _block(x, 1, i, 0)
+        for k in range(i + 1, links):
+            m = minus_transposed_product(m, _block(factor, links, k, i), _block(x, 1, k, 0))
+        _store_block(x, 1, i, 0, _backward(_block(factor, links, i, i), m))
+    for i in range(links + 1):
+        m = _block(out, 1, i, 0)
+        for k in range(links):
+            m = minus_product(m, _block(gaps, links, i, k), _block(x, 1, k, 0))
+        _store_block(out, 1, i, 0, m)
 
 
 @part
 def torques_to_motion(pairs, torques, v, s):
     """Add to v and s what torques on all beads cause."""
     beads = v.shape[0] // 3
+    rotation, coupling = pairs.rotation, pairs.coupling
     for i in range(beads):
         velocity, spin = load3(v, i), load3(s, i)
         for j in range(beads):
-            dv, ds = torque_response(pairs, i, j, load3(torques, j))
+            dv, ds = torque_response(rotation, coupling, i, j, load3(torques, j))
             velocity, spin = add(velocity, dv), add(spin, ds)
         store3(v, i, velocity)
         store3(s, i, spin)
@@ -315,7 +452,7 @@ def link_rates(chain, flow, work, motion):
     rates, multipliers = motion
     links = state.shape[0] // 3 - 1
     (pairs, factor, gaps, v, s, torques), _ = layout(work, links + 1)
-    assemble(state, pairs, factor, gaps, v, s)
+    assemble(state, pairs, factor, gaps)
     ambient(flow, radius, v, s)
     for i in range(links + 1):
         torque = subtract(_joint_moment(state, i + 1, law), _joint_moment(state, i - 1, law))
@@ -344,6 +481,75 @@ def _moment_change(state, g, j, law):
     return bend, change
 
 
+@arithmetic
+def _spun(t, here, u, before, factor):
+    """factor ([t]× here − [u]× before), matrices."""
+    rows = []
+    for a, b in ((1, 2), (2, 0), (0, 1)):
+        for c in range(3):
+            change = t[a] * here[3 * b + c] - t[b] * here[3 * a + c]
+            rows.append(factor * (change - (u[a] * before[3 * b + c] - u[b] * before[3 * a + c])))
+    return tuple(rows)
+
+
+@arithmetic
+def _along(t, here, u, before):
+    """tᵀ here + uᵀ before."""
+    return tuple(
+        t[0] * here[c]
+        + t[1] * here[3 + c]
+        + t[2] * here[6 + c]
+        + u[0] * before[c]
+        + u[1] * before[3 + c]
+        + u[2] * before[6 + c]
+        for c in range(3)
+    )
+
+
+@inlined
+def _moment_columns(state, g, j, law):
+    """Change of the moment at bead j in three columns of changes g of the links."""
+    t, u = load3(state, j - 1), load3(state, j)
+    before, here = _block(g, 1, j - 1, 0), _block(g, 1, j, 0)
+    f = splat(1.0)
+    if law == 1:
+        f = rod_factor(t, u)
+    change = _spun(t, here, u, before, f)
+    if law == 1:
+        change = plus_outer(change, scale(-0.5 * f * f, cross(t, u)), _along(t, here, u, before))
+    return change
+
+
+@arithmetic
+def _identity_less(own, factor, m):
+    """own I − factor m."""
+    return tuple((own if i % 4 == 0 else 0.0) - factor * m[i] for i in range(9))
+
+
+@inlined
+def _joint_columns(state, pairs, j, slips, columns):
+    """Slips and gaps, and in the last place the mean velocity, from unit moments at joint j: they turn the bead before
+    it forth and the bead behind it back."""
+    links = state.shape[0] // 3 - 1
+    _, r, coupling, _, all_coupling = pairs
+    for i in range(links):
+        a, b, c, d = _place(i, j - 1), _place(i, j + 1), _place(i + 1, j - 1), _place(i + 1, j + 1)
+        q = subtract(_coupling(coupling, i, j - 1), _coupling(coupling, i + 1, j - 1))
+        q = subtract(q, subtract(_coupling(coupling, i, j + 1), _coupling(coupling, i + 1, j + 1)))
+        spin = minus(plus(load6(r, a), load6(r, c)), plus(load6(r, b), load6(r, d)))
+        gap = _turned(scale(-4.0 / 3.0, q))
+        _store_block(columns, 1, i, 0, gap)
+        _store_block(slips, 1, i, 0, _joint_slip(gap, cross_symmetric(load3(state, i), spin)))
+    q = subtract(load3(all_coupling, j - 1), load3(all_coupling, j + 1))
+    _store_block(columns, 1, links, 0, _turned(scale(4.0 / 3.0 / (links + 1), q)))
+
+
+@arithmetic
+def _joint_slip(gap, turned):
+    """−gap − 4/3 [e]× R."""
+    return tuple(-1.0 * a - 4.0 / 3.0 * b for a, b in zip(gap, turned, strict=True))
+
+
 @part
 def stage(chain, flow, ahead, work, motion):
     """As implicit_drain.stage, with this mobility: the unknowns are the joint moments βM at links e + δe.
@@ -358,40 +564,17 @@ def stage(chain, flow, ahead, work, motion):
     n, m = 3 * links, 3 * (links - 1)
     (common, own), _ = stage_layout(work, links + 1)
     pairs, factor, gaps, v, s, _ = common
-    bending, matrix, moments, free, g, gap_column, slips, columns = own
-    assemble(state, pairs, factor, gaps, v, s)
-    one, none = splat(1.0), splat(0.0)
+    bending, matrix, moments, free, g, slips, columns = own
+    assemble(state, pairs, factor, gaps)
     for j in range(1, links):
-        for c in range(3):
-            unit = (one if c == 0 else none, one if c == 1 else none, one if c == 2 else none)
-            ahead, behind = scale(4.0 / 3.0, unit), scale(-4.0 / 3.0, unit)
-            for i in range(links + 1):
-                v1, s1 = torque_response(pairs, i, j - 1, ahead)
-                v2, s2 = torque_response(pairs, i, j + 1, behind)
-                store3(v, i, add(v1, v2))
-                store3(s, i, add(s1, s2))
-            for i in range(links):
-                slip, gap = _slip(state, v, s, i), difference(v, i)
-                for d in range(3):
-                    store(slips, 3 * (3 * i + d) + c, slip[d])
-                    store(columns, 3 * (3 * i + d) + c, gap[d])
-            mean = mean_vector(v, links + 1)
-            for d in range(3):
-                store(columns, 3 * (n + d) + c, mean[d])
-        _roll_columns(factor, gaps, n, slips, columns)
-        for c in range(3):
-            column = 3 * (j - 1) + c
-            for row in range(n + 3):
-                value = load(columns, 3 * row + c)
-                store(gap_column, row, value)
-                store(bending, row * m + column, value)
-            for i in range(1, links):
-                _, change = _moment_change(state, gap_column, i, law)
-                for d in range(3):
-                    row = 3 * (i - 1) + d
-                    store(
-                        matrix, row * m + column, (one if row == column else none) - beta * sigma * change[d]
-                    )
+        _joint_columns(state, pairs, j, slips, columns)
+        _roll_columns(factor, gaps, links, slips, columns)
+        for row in range(n + 3):
+            store3(bending, row * (links - 1) + j - 1, load3(columns, row))
+        for i in range(1, links):
+            change = _moment_columns(state, columns, i, law)
+            own = splat(1.0) if i == j else splat(0.0)
+            _store_block(matrix, links - 1, i - 1, j - 1, _identity_less(own, beta * sigma, change))
     ambient(flow, radius, v, s)
     roll(state, factor, gaps, v, s, multipliers, free)
     for i in range(links):
@@ -404,8 +587,10 @@ def stage(chain, flow, ahead, work, motion):
         inverse = 1.0 / load(matrix, k * m + k)
         for i in range(k + 1, m):
             ratio = load(matrix, i * m + k) * inverse
-            for j in range(k + 1, m):
-                store(matrix, i * m + j, load(matrix, i * m + j) - ratio * load(matrix, k * m + j))
+            for j in range((k + 1) // 3, links - 1):  # by threes: what is left of the pivot is not read again
+                here = load3(matrix, i * (links - 1) + j)
+                here = add_scaled(here, -1.0 * ratio, load3(matrix, k * (links - 1) + j))
+                store3(matrix, i * (links - 1) + j, here)
             store(moments, i, load(moments, i) - ratio * load(moments, k))
     for back in range(m):
         i = m - 1 - back

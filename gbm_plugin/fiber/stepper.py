@@ -79,6 +79,9 @@ class Stepper:
         self._ages: list[float] = []
         self._last_step = np.full(fibers.count, np.inf)  # suggested to each fiber
         self._step = self._last_step.copy()
+        self._tensions = np.zeros(
+            fibers.count
+        )  # over 6πμa, of each fiber in the last step, and their largest
         self._last_tension = 0.0
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
@@ -291,6 +294,7 @@ class Stepper:
                     f"{MOST_SUBSTEPS} are allowed: take the implicit integrator"
                 )
             self._followed(self._explicit(count), count)
+            self._tension = float(self._tensions.max())
             return
         everyone = np.arange(self.fibers.count)
         if count <= AFFORDABLE:
@@ -299,6 +303,7 @@ class Stepper:
         else:
             self._ages = []
             self._implicit(everyone)
+        self._tension = float(self._tensions.max())
 
     def _substeps(self) -> int:
         """Sub-steps that keep ab3 stable: eq. (10), less for bent discrete rods and under great tension."""
@@ -332,7 +337,7 @@ class Stepper:
         )
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
-        self._tension = tension.reshape(-1)[: fibers.count].max()
+        self._tensions[:] = tension.reshape(-1)[: fibers.count]
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
         self._count(count, error if self.integrator == "ab3" else error[:0])
@@ -345,7 +350,7 @@ class Stepper:
         times, (velocity, rotation) = self._ambient.polynomial(self._start)
         samples = Samples(velocity, rotation, times)
         elapsed, error, trial = np.zeros(fibers.count), np.zeros(fibers.count), np.zeros(fibers.count)
-        pace = implicit.Pace(trial, elapsed, self._step, error)
+        pace = implicit.Pace(trial, elapsed, self._step, error, self._tensions)
         before = implicit.Ends(self._last, self._last_multipliers)
         after = implicit.Ends(self._state, self._multipliers)
         attempts, refined = 0, np.zeros(0, dtype=int)

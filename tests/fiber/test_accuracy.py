@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from gbm_plugin import Fibers, simulate
+from gbm_plugin.fiber import Stepper
 from gbm_plugin.flow import LinearFlow, TaylorGreen
 
-from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step
+from fiber_cases import WavyFlow, bent, crooked, positions_of, run_once_per_step, straight_chain
 
 STILL = LinearFlow(np.zeros((3, 3)))
 
@@ -108,3 +109,24 @@ def test_auto_takes_ab3_where_it_may_and_agrees():
     stiff = Fibers(bent(5, 8, 0.1), 1.0, 1.0)
     run = run_once_per_step(stiff, WavyFlow(), 0.1, 10, integrator="auto")
     assert run.report()["ab3_steps"] == 0
+
+
+@pytest.mark.parametrize("mobility", ["freeDrain", "rpy"])
+def test_auto_returns_to_ab3_when_the_tension_is_over(mobility):
+    """Slender-body theory: a rate γ pulls a chain of N beads with γdN²/8 over 6πμa, for which ab3 needs many steps."""
+    beads, diameter, step = 20, 0.1, 0.1
+    fibers = Fibers(straight_chain(beads, diameter), 1e-6, 1.0)
+    stepper = Stepper(fibers, integrator="auto", mobility=mobility)
+
+    def steps(rate, count):
+        """So many steps of extension at this rate; those of ab3 among them."""
+        flow = LinearFlow(rate * np.diag([1.0, -0.5, -0.5]))
+        before = stepper.report()["ab3_steps"]
+        stepper.observe(stepper.time, *flow.sample(stepper.positions, stepper.time, "rotation"))
+        for _ in range(count):
+            stepper.advance(step)
+            stepper.observe(stepper.time, *flow.sample(stepper.positions, stepper.time, "rotation"))
+        return stepper.report()["ab3_steps"] - before
+
+    assert steps(10.0, 6) <= 1  # the first knows of no tension yet
+    assert steps(1e-3, 6) == 3  # those whose three samples are all of the weak flow

@@ -18,7 +18,7 @@ from ...report.style import new_figure
 from ...threads import limited_to
 from ..study import option, steps
 
-PARTS = ("integrators", "beads", "mobility", "sampling", "step", "engines")
+PARTS = ("integrators", "beads", "mobility", "sampling", "step", "engines", "peers")
 
 
 def _part(name: str) -> ModuleType:

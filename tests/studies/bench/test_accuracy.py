@@ -1,10 +1,13 @@
 """The parts of the study of accuracy, small: what theory says of each must be seen in its rows."""
 
+from contextlib import nullcontext
+
+import numpy as np
 import pytest
 
 from gbm_plugin.case.beads import bead_error
 from gbm_plugin.scales import coupling_error, coupling_step
-from gbm_plugin.studies.accuracy import front, integrators, sampling
+from gbm_plugin.studies.accuracy import front, integrators, peers, sampling
 
 
 def test_front():
@@ -44,3 +47,24 @@ def test_rule_of_beads_and_of_the_step():
     assert bead_error(20, 1 / 0.15) == pytest.approx(7.5e-3)
     assert coupling_step(1e-3, 1.0) == pytest.approx(0.2714, abs=1e-4)
     assert coupling_error(coupling_step(1e-4, 2.0), 2.0) == pytest.approx(1e-4)
+
+
+def test_peers_left_out_where_they_cannot_be_installed(monkeypatch):
+    """Ours remain: both meet the target with the same beads, and auto is the measure of the times."""
+    monkeypatch.setattr(peers.programs, "environment", lambda: nullcontext(None))
+    monkeypatch.setattr(peers, "COUNT", 2)
+    monkeypatch.setattr(peers, "BEADS", {1e-2: (4, 16)})
+    rows = peers.measure(quick=True)
+    assert [row["program"] for row in rows] == ["gbm, auto", "AB3, eq. (10)", "AB3, own limit"]
+    assert all(row["beads"] == 16 and row["error"] < 1e-2 for row in rows)
+    assert rows[0]["over_ours"] == 1
+    assert "could not be installed" in peers.lines(rows)[-1]
+
+
+def test_chains_of_lammps():
+    """A data file names every bead, bond and angle of two chains once."""
+    lines = peers.programs._chains(np.arange(24.0).reshape(2, 4, 3)).splitlines()
+    assert lines[2:5] == ["8 atoms", "6 bonds", "4 angles"]
+    bonds = lines[lines.index("Bonds") + 2 :][:6]
+    assert [line.split()[2:] for line in bonds[2:4]] == [["3", "4"], ["5", "6"]]
+    assert lines[-1].split() == ["4", "1", "6", "7", "8"]
