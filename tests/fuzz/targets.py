@@ -27,10 +27,12 @@ from gbm_plugin.spectral import EswaranPope, SpectralSolver
 import alter
 
 CASE = Path(__file__).parents[2] / "openfoam_case"
-FAMILIES = """families
+FAMILIES = """interpolation trilinear;
+coupling { feedback yes; ownDisturbance removed; }
+families
 {
-    soft { count 3; beads 5; length 1; bendingStiffness 1e-4; seed 1; }
-    stiff { count 2; beads 4; length 1; bendingStiffness 1e-3; seed 2; integrator implicit; }
+    soft { count 3; beads 5; length 0.6; bendingStiffness 1e-4; seed 1; }
+    stiff { count 2; beads 4; length 0.6; bendingStiffness 1e-3; seed 2; integrator implicit; }
 }
 """
 POSITIONS = 'families { one { shape file; positions "positions.npy"; bendingStiffness 1e-4; } }\n'
@@ -64,6 +66,7 @@ def _fleet(folder: Path) -> Fleet:
 
 
 def _step(fleet: Fleet) -> None:
+    fleet.reaction(STEP)
     fleet.advance(STEP)
     for _ in range(2):
         x = fleet.positions
