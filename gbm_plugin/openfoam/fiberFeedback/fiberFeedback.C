@@ -24,7 +24,7 @@ Foam::fv::fiberFeedback::fiberFeedback
     const fvMesh& mesh
 )
 :
-    option(name, modelType, dict, mesh),
+    incompressibleSource(name, modelType, dict, mesh),
     force_
     (
         IOobject
@@ -145,19 +145,6 @@ void Foam::fv::fiberFeedback::addSup(fvMatrix<vector>& eqn, const label)
             V[celli]
            *(hasBefore_ ? 2*now[celli] - before_[celli] : now[celli]);
     }
-}
-
-
-void Foam::fv::fiberFeedback::addSup
-(
-    const volScalarField&,
-    fvMatrix<vector>&,
-    const label
-)
-{
-    FatalErrorInFunction
-        << type() << " is for incompressible solvers"
-        << exit(FatalError);
 }
 
 

@@ -16,7 +16,7 @@ Foam::fv::turbulenceForcing::turbulenceForcing
     const fvMesh& mesh
 )
 :
-    option(name, modelType, dict, mesh),
+    incompressibleSource(name, modelType, dict, mesh),
     writeFile(mesh, name, name),
     nu_(0),
     timeIndex_(-1),
@@ -274,19 +274,6 @@ void Foam::fv::turbulenceForcing::addSup(fvMatrix<vector>& eqn, const label)
         beginStep(eqn.psi());
     }
     add(eqn);
-}
-
-
-void Foam::fv::turbulenceForcing::addSup
-(
-    const volScalarField&,
-    fvMatrix<vector>&,
-    const label
-)
-{
-    FatalErrorInFunction
-        << type() << " is for incompressible solvers"
-        << exit(FatalError);
 }
 
 

@@ -50,6 +50,9 @@ Foam::slabTransform::slabTransform
         columnCounts_[rank] = nRows()*row*(layers_[rank + 1] - layers_[rank]);
         columnStarts_[rank] = nRows()*row*layers_[rank];
     }
+    // what is here already stays in its planes
+    planeCounts_[Pstream::myProcNo()] = 0;
+    columnCounts_[Pstream::myProcNo()] = 0;
 
     const size_t perLayer = size_t(components)*n_.y()*width_;
     const size_t perRow = size_t(components)*n_.z()*width_;
@@ -57,7 +60,7 @@ Foam::slabTransform::slabTransform
     columns_ =
         Pstream::parRun()
       ? fftw_alloc_real(perRow*max(label(1), nRows()))
-      : planes_;
+      : nullptr;
     plane_ = fftw_alloc_real(size_t(n_.y())*width_);
 
     plan(rowStride);
@@ -71,10 +74,7 @@ Foam::slabTransform::~slabTransform()
     fftw_destroy_plan(columnForward_);
     fftw_destroy_plan(columnBackward_);
     fftw_free(plane_);
-    if (columns_ != planes_)
-    {
-        fftw_free(columns_);
-    }
+    fftw_free(columns_);
     fftw_free(planes_);
 }
 
@@ -108,29 +108,19 @@ void Foam::slabTransform::plan(const label rowStride)
 
     // all components of a column at once
     {
-        const int stride = components_*max(label(1), nRows())*nModes;
-        const int between = max(label(1), nRows())*nModes;
-
-        const fftw_iodim there[] = {{n_.z(), stride, nModes}};
-        const fftw_iodim back[] = {{n_.z(), nModes, stride}};
-        const fftw_iodim manyThere[] =
-        {
-            {components_, between, n_.z()*nModes}, {nModes, 1, 1}
-        };
-        const fftw_iodim manyBack[] =
-        {
-            {components_, n_.z()*nModes, between}, {nModes, 1, 1}
-        };
+        const fftw_iodim along[] = {{n_.z(), nModes, nModes}};
+        const int size = n_.z()*nModes;
+        const fftw_iodim many[] = {{components_, size, size}, {nModes, 1, 1}};
         double* column = fftw_alloc_real(columnSize());
 
         columnForward_ = fftw_plan_guru_dft
         (
-            1, there, 2, manyThere, modes(columns_), modes(column),
+            1, along, 2, many, modes(column), modes(column),
             FFTW_FORWARD, planning
         );
         columnBackward_ = fftw_plan_guru_dft
         (
-            1, back, 2, manyBack, modes(column), modes(columns_),
+            1, along, 2, many, modes(column), modes(column),
             FFTW_BACKWARD, planning
         );
         fftw_free(column);
@@ -150,6 +140,23 @@ double* Foam::slabTransform::rowsFor
     return
         planes_ + planeStarts_[rank]
       + (z*components_ + component)*nRanksRows*width_;
+}
+
+
+double* Foam::slabTransform::rowAt
+(
+    const label z,
+    const label component,
+    const label y
+) const
+{
+    const label me = Pstream::myProcNo();
+
+    return
+        layers_[me] <= z && z < layers_[me + 1]
+      ? rowsFor(me, z - layers_[me], component) + size_t(y)*width_
+      : columns_
+      + ((size_t(z)*components_ + component)*nRows() + y)*width_;
 }
 
 
@@ -215,19 +222,25 @@ void Foam::slabTransform::toColumns()
 
 void Foam::slabTransform::columnForward(const label y, double* column) const
 {
-    fftw_execute_dft
-    (
-        columnForward_, modes(columns_ + size_t(y)*width_), modes(column)
-    );
+    double* row = column;
+    for (label c = 0; c < components_; ++c)
+    for (label z = 0; z < n_.z(); ++z, row += width_)
+    {
+        std::copy_n(rowAt(z, c, y), width_, row);
+    }
+    fftw_execute_dft(columnForward_, modes(column), modes(column));
 }
 
 
 void Foam::slabTransform::columnBackward(const label y, double* column)
 {
-    fftw_execute_dft
-    (
-        columnBackward_, modes(column), modes(columns_ + size_t(y)*width_)
-    );
+    fftw_execute_dft(columnBackward_, modes(column), modes(column));
+    const double* row = column;
+    for (label c = 0; c < components_; ++c)
+    for (label z = 0; z < n_.z(); ++z, row += width_)
+    {
+        std::copy_n(row, width_, rowAt(z, c, y));
+    }
 }
 
 
