@@ -77,7 +77,8 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
     step_(time.timeIndex()),
     saved_(step_),
     feedback_(nullptr),
-    rho_(1),
+    nCells_(0),
+    cellMass_(0),
     wanted_(NOTHING)
 {
     const fatalErrors guard;
@@ -110,7 +111,9 @@ Foam::functionObjects::fiberCoupling::fiberCoupling
 
     if (feedback::wanted(time))
     {
-        rho_ = fiberProperties.lookupOrDefault<scalar>("rho", 1);
+        const scalar rho = fiberProperties.lookupOrDefault<scalar>("rho", 1);
+        nCells_ = returnReduce(scalar(mesh_.nCells()), sumOp<scalar>());
+        cellMass_ = rho*gSum(mesh_.V().field())/nCells_;
         feedback_ = &fv::fiberFeedback::addTo(mesh_, UName_);
         feedback_->renewWith([this]() { const fatalErrors fatal; advance(); });
     }
@@ -386,15 +389,16 @@ void Foam::functionObjects::fiberCoupling::receiveForces
     }
     reduce(exchange, sumOp<scalar>());
 
-    const scalarField& V = mesh_.V();
-    *feedback::exchange() = exchange/(rho_*gSum(V));
+    *feedback::exchange() = exchange/(nCells_*cellMass_);
 
-    vectorField force
-    (
-        sampler_->spread(beads_->distribute(std::move(loads), 6), beads_())
-    );
-    force /= rho_*V;
-    feedback_->set(force, step_);
+    // a uniform box: sampler refuses to spread on others
+    for (scalar& load : loads)
+    {
+        load /= cellMass_;
+    }
+    const scalarList own(beads_->distribute(std::move(loads), 6));
+    sampler_->spread(own, beads_(), feedback_->next());
+    feedback_->renewed(step_);
     t.spreading += watch.lap();
 }
 

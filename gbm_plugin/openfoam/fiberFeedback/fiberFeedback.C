@@ -110,14 +110,10 @@ void Foam::fv::fiberFeedback::layOut()
 
 // * * * * * * * * * * * * * * * Member Functions  * * * * * * * * * * * * * //
 
-void Foam::fv::fiberFeedback::set(const vectorField& force, const label step)
+void Foam::fv::fiberFeedback::renewed(const label step)
 {
     hasBefore_ = step_ != -1 || restarted_;
-    if (hasBefore_)
-    {
-        before_ = force_.primitiveField();
-    }
-    force_.primitiveFieldRef() = force;
+    before_.swap(force_.primitiveFieldRef());
     force_.correctBoundaryConditions();
     step_ = step;
 }

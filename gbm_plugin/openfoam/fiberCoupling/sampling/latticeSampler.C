@@ -117,13 +117,15 @@ INLINE void spreadAll
     constexpr int below = Interpolant::below;
     const vector perCell(cells.box().perCell());
     const Vector<label> stride(cells.strides());
+    const label* slots = cells.slots().cdata();
+    const unsigned char* runs = cells.runs().cdata();
 
     forAll(beads.points(), bead)
     {
         const scalar* load = loads + 6*beads.placeOf(bead);
         vector x;
-        const label* slot =
-            cells.slots().cdata() + cells.around(beads.points()[bead], x)
+        const label slot =
+            cells.around(beads.points()[bead], x)
           - below*(stride.x() + stride.y() + stride.z());
 
         double w[3][N], s[3][N];
@@ -150,14 +152,30 @@ INLINE void spreadAll
             }
             const vector byValue(yz*force + (couple ^ slopes));
             const vector bySlope(0, yz*couple.z(), -yz*couple.y());
-            const label* values = slot + stride.y()*j + stride.z()*k;
+            const label first = slot + stride.y()*j + stride.z()*k;
+            const label* values = slots + first;
 
+            double row[3*N];
+            for (int i = 0; i < N; ++i)
+            for (direction c = 0; c < 3; ++c)
+            {
+                row[3*i + c] = w[0][i]*byValue[c] + s[0][i]*bySlope[c];
+            }
+            if (runs[first] >= N)
+            {
+                double* target = own[values[0]].v_;
+                for (int i = 0; i < 3*N; ++i)
+                {
+                    target[i] += row[i];
+                }
+                continue;
+            }
             for (int i = 0; i < N; ++i)
             {
                 const label value = values[i];
                 vector& target =
                     value < nCells ? own[value] : neighbours[value - nCells];
-                target += w[0][i]*byValue + s[0][i]*bySlope;
+                target += vector(row[3*i], row[3*i + 1], row[3*i + 2]);
             }
         }
     }
@@ -183,15 +201,17 @@ SPREAD_WITH(quintic)
 
 
 template<class Interpolant>
-Foam::vectorField Foam::latticeSampler<Interpolant>::spread
+void Foam::latticeSampler<Interpolant>::spread
 (
     const UList<scalar>& loads,
-    const beadExchange& beads
+    const beadExchange& beads,
+    vectorField& cells
 ) const
 {
     static const Interpolant interpolant = Interpolant();
 
-    vectorField cells(lattice_.nCells(), Zero);
+    cells.setSize(lattice_.nCells());
+    cells = Zero;
     List<vector> neighbours(lattice_.nNeighbours(), Zero);
     spreadWith
     (
@@ -199,8 +219,6 @@ Foam::vectorField Foam::latticeSampler<Interpolant>::spread
         neighbours.begin(), cells.size()
     );
     lattice_.addBack(neighbours, cells);
-
-    return cells;
 }
 
 

@@ -68,16 +68,15 @@ Foam::scalarList Foam::schemeSampler::sample
 }
 
 
-Foam::vectorField Foam::schemeSampler::spread
+void Foam::schemeSampler::spread
 (
     const UList<scalar>&,
-    const beadExchange&
+    const beadExchange&,
+    vectorField&
 ) const
 {
     FatalErrorInFunction
         << "feedback of fibers is spread with the weights of their sampling,"
         << " which interpolation " << scheme_ << " does not give; allowed:"
         << " trilinear cubic quintic" << exit(FatalError);
-
-    return vectorField();
 }
