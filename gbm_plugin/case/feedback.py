@@ -13,7 +13,7 @@ NEGLIGIBLE, TOO_LARGE = (
     0.05,
     0.5,
 )  # of its slip, that a bead finds: nothing is done below, nothing helps above
-STABLE = 2.0  # largest exchange_step seen to be stable; at 3 it was not (docs/results/feedback.md)
+STABLE = 0.5  # exchange_step: seen unstable from 0.35 to 3 on, by beads and interpolation (docs/results/feedback.md)
 
 
 def cell_size(scene) -> float | None:

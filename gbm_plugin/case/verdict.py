@@ -32,7 +32,7 @@ BEADS = (
 )  # 2a/l_p: on a curve of radius l_p differences between beads err by (2a/l_p)^2/12, 5 and 20 %
 # d/eta: up to a shear Reynolds number (d/2)^2/(nu tau_eta) of 1, and a Stokes number d^2/(18 eta^2) of about 1
 BEAD = (2.0, 5.0)
-EXCHANGE = (0.5, STABLE)  # with feedback, of the mean over the box: somewhere there are more beads
+EXCHANGE = (0.3, STABLE)  # with feedback, of the mean over the box: somewhere there are more beads
 DENSE = (3.0, 10.0)  # n L^3: fibers in the cube of their length; beyond some they meet
 LENGTH = (0.5, 1.0)  # L over the box: a longer fiber meets the flow of its own other end
 

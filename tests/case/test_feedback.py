@@ -36,7 +36,7 @@ def test_info_says_what_fibers_are_to_the_flow(tmp_path):
     nu = scene.kinematic_viscosity
     assert exchange_step(scene) == pytest.approx(6 * np.pi * nu * a * 20 * n * 0.02, rel=1e-6)
     told = " ".join(gbm("info", path).stdout.split())
-    assert "forces and torques of the beads" in told and "6 pi nu a n dt: stable to 2" in told
+    assert "forces and torques of the beads" in told and "6 pi nu a n dt: stable to 0.5" in told
 
 
 @pytest.mark.parametrize(("words", "is_"), [("", "removed"), ("ownDisturbance kept;", "kept")])
@@ -55,7 +55,7 @@ def test_what_cannot_be_is_refused_in_one_line(tmp_path):
         read_scene(path)
     path = coupled(tmp_path / "many", "count 100000; beads 40; length 1;", time_step=0.2)
     with pytest.raises(
-        CaseError, match=r"too many beads for deltaT 0.2: 6 pi nu a n deltaT is .* stable up to 2"
+        CaseError, match=r"too many beads for deltaT 0.2: 6 pi nu a n deltaT is .* stable up to 0.5"
     ):
         read_scene(path)
     path = coupled(tmp_path / "word", "count 10; beads 20; length 1;", interpolation="cellPoint")
