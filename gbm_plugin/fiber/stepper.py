@@ -27,7 +27,8 @@ from .strain import with_strain
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
-AFFORDABLE = 5  # sub-steps of ab3 that cost less than an implicit step (docs/accuracy.md)
+AFFORDABLE = 12  # sub-steps of ab3 that cost as much as an implicit step (docs/accuracy.md),
+DIVIDED = 4  # of which a flow step is taken for so many at most
 SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open within 1e-14
 LOST = 0.5  # [rad] estimated error of a sub-step of ab3 beyond which its links point nowhere in particular
 
@@ -297,7 +298,7 @@ class Stepper:
             self._tension = float(self._tensions.max())
             return
         everyone = np.arange(self.fibers.count)
-        if count <= AFFORDABLE:
+        if count <= AFFORDABLE * np.clip(self._length / self._step, 1, DIVIDED).mean():
             error = self._explicit(count)
             self._implicit(everyone[~(error <= self.tolerance)])
         else:

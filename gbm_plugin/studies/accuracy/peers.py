@@ -9,6 +9,7 @@ interaction, a flow known in samples only.
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
@@ -62,11 +63,15 @@ def _programs(carrier: Carrier, target: float, place) -> Iterator[tuple[str, Cal
 
 
 def _first(name: str, target: float, move: Callable[[int], Moved], exact: NDArray, length: float) -> dict:
-    """The row of the fewest beads that meet the target, or of the most where none does."""
+    """The row of the fewest beads that meet the target, or of the most where none does, or of those that take longer
+    than programs.MOST_SECONDS."""
     for beads in BEADS[target]:
-        moved = move(beads)
+        try:
+            moved = move(beads)
+        except subprocess.TimeoutExpired:
+            moved = Moved(np.full_like(exact, np.nan), np.nan, 0, programs.MOST_SECONDS)
         error = float(np.sqrt(((moved.vectors - exact) ** 2).sum(axis=1).mean())) / length
-        if error <= target:
+        if not error > target:  # or without an end
             break
     row = {"program": name, "target": target, "beads": beads, "steps": moved.steps, "error": error}
     return row | {"stretch": moved.stretch, "seconds": moved.seconds}
@@ -99,7 +104,7 @@ def lines(rows: Sequence[dict]) -> list[str]:
     """Times are processor time of one thread, of all fibers; stretch: of the worst link."""
     text = ["target  program           N     steps    error  stretch    CPU [s]  over gbm"]
     for r in rows:
-        missed = "" if r["error"] <= r["target"] else "  missed"
+        missed = "" if r["error"] <= r["target"] else "  missed" if r["steps"] else "  stopped"
         text.append(
             f"{r['target']:6g}  {r['program']:14s}{r['beads']:5d}{r['steps']:10d}{r['error']:9.1e}{r['stretch']:9.1e}"
             f"{r['seconds']:11.4f}{r['over_ours']:10.1f}{missed}"
