@@ -76,6 +76,9 @@ def draw(axes, rows: list[dict]) -> None:
             axes.loglog(x, y, "o", markersize=3, linestyle=line, color=colour, label=label)
             if line == "-":
                 axes.loglog(x, [r["rule"] for r in own], ":", color=colour, linewidth=1)
+    beads = sorted({r["beads"] for r in rows})
+    axes.set_xticks(beads, [str(n) for n in beads])
+    axes.set_xticks([], minor=True)
     axes.set(title="beads (dotted: the rule)", xlabel="N", ylabel="error of the ends / L")
     axes.legend(fontsize=7)
 

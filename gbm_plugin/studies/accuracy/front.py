@@ -16,6 +16,12 @@ def on_front(row: Mapping, rows: Sequence[Mapping], cost: str = "seconds", error
     return True
 
 
+def draw_front(axes, rows: Sequence[Mapping], cost: str, error: str = "error") -> None:
+    """A grey line through those on the front, by their cost."""
+    front = sorted((row[cost], row[error]) for row in rows if row["on_front"])
+    axes.plot(*zip(*front, strict=True), "--", color="0.6", linewidth=2, zorder=0)
+
+
 def mark_front(rows: Sequence[dict], *same: str, cost: str = "seconds", error: str = "error") -> None:
     """Add `on_front` to each row, among those alike in the columns `same`."""
     for row in rows:

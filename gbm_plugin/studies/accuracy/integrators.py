@@ -14,7 +14,7 @@ from itertools import product
 from ...fiber import ab3
 from ...report.style import COLOURS
 from .flows import Carrier, cellular, turbulent
-from .front import mark_front
+from .front import draw_front, mark_front
 from .march import best, march
 
 REGIMES = {
@@ -88,7 +88,7 @@ def _regime(carrier: Carrier, mobility: str, regime: str, steps, end: float, mos
 
 
 def draw(axes, rows: list[dict]) -> None:
-    """Error of the ends against time in free drain at the first step, of all regimes; the default is framed."""
+    """Error of the ends against time in free drain at the first step; the default is framed, the front dashed."""
     shown = [r for r in rows if r["mobility"] == "freeDrain" and r["step"] == rows[0]["step"]]
     names = list(dict.fromkeys(r["integrator"] for r in shown))
     flow = shown[-1]["flow"]
@@ -96,13 +96,15 @@ def draw(axes, rows: list[dict]) -> None:
         for colour, name in zip(COLOURS, names, strict=False):
             own = [r for r in shown if (r["flow"], r["regime"], r["integrator"]) == (flow, regime, name)]
             x, y = ([r[key] for r in own] for key in ("microseconds", "error"))
-            axes.loglog(x, y, marker, linestyle="-", markersize=4, linewidth=0.8, color=colour)
+            axes.loglog(x, y, marker, markersize=4, color=colour)
             for r in own:
                 if r["default"]:
                     axes.plot(r["microseconds"], r["error"], "ks", markersize=9, fillstyle="none")
+        draw_front(axes, [r for r in shown if (r["flow"], r["regime"]) == (flow, regime)], "microseconds")
         axes.plot([], [], marker, color="0.4", linestyle="", label=regime)
     for colour, name in zip(COLOURS, names, strict=False):
         axes.plot([], [], color=colour, label=name)
+    axes.plot([], [], "--", color="0.6", linewidth=2, label="front")
     axes.set(title=f"integrators, {flow}", xlabel="µs a bead and τ", ylabel="error of the ends / L")
     axes.legend(fontsize=7)
 

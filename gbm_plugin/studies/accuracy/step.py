@@ -44,6 +44,8 @@ def draw(axes, rows: list[dict]) -> None:
             axes.loglog(x, y, "o", markersize=3, linestyle=line, color=colour, label=f"{regime}, {flow}")
     rule = [END * coupling_error(step, 1.0) for step in STEPS]
     axes.loglog(STEPS, rule, ":k", label=f"{EXTRAPOLATION:g} (Δt/τ)³ a τ")
+    axes.set_xticks(STEPS, [f"{step:g}" for step in STEPS])
+    axes.set_xticks([], minor=True)
     axes.set(title="one sample a step", xlabel="Δt/τ", ylabel=f"error of the ends / L after {END:g} τ")
     axes.legend(fontsize=7)
 
