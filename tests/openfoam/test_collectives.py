@@ -46,8 +46,9 @@ CALLS = {
         "made for each run; called in addSup, endRate and correct of every rank",
     ),
     "fiberCoupling/fiberCoupling.C": (
-        9,
-        "once a step, provisional or not as all daemons together say; three where the dictionary asks for feedback",
+        10,
+        "once a step, provisional or not as all daemons together say; two at a start and two in a step where the "
+        "dictionary asks for feedback",
     ),
     "fiberCoupling/sampling/beadExchange.C": (
         4,
