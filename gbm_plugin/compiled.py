@@ -23,6 +23,7 @@ from pickle import UnpicklingError
 import numpy as np
 from numba import config, njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.runtime import rtsys
 
 log = logging.getLogger(__name__)
 
@@ -116,6 +117,11 @@ def _in_folder(folder: Path) -> type[FunctionCache]:
 
     class Cache(FunctionCache):
         _impl_class = Implementation
+
+        def load_overload(self, signature, context):
+            # what Numba would import here, to compile with, is most of a short run; code only needs its run time
+            rtsys.initialize(context)
+            return self._load_overload(signature, context)
 
     return Cache
 

@@ -6,8 +6,6 @@ import math
 import re
 from pathlib import Path
 
-from PyFoam.RunDictionary.SolutionDirectory import SolutionDirectory
-
 from .share import WHOLE, Share, shared_files
 
 STATE_FILE = "uniform/fibers.npz"  # of a single daemon; of several: fibers.<number>of<daemons>.npz
@@ -77,9 +75,8 @@ def numbered(folder: Path) -> dict[float, Path]:
 
 def time_folders(case: Path) -> dict[float, str]:
     """Times with a folder in the case, or in its processor folders, and the folders' names."""
-    names = list(SolutionDirectory(str(case), archive=None, paraviewLink=False).getTimes())
-    names += [p.name for p in numbered(case / "processor0").values()]
-    return {time: name for name in names if (time := as_time(name)) is not None}
+    folders = numbered(case) | numbered(case / "processor0")
+    return {time: folder.name for time, folder in folders.items()}
 
 
 def velocity_file(folder: Path) -> Path | None:

@@ -7,9 +7,6 @@ import re
 from pathlib import Path
 
 import numpy as np
-from PyFoam.LogAnalysis.ContinuityLineAnalyzer import GeneralContinuityLineAnalyzer
-from PyFoam.LogAnalysis.ExecutionTimeLineAnalyzer import GeneralExecutionLineAnalyzer
-from PyFoam.LogAnalysis.FoamLogAnalyzer import FoamLogAnalyzer
 
 MOST = 32 << 20  # bytes of a log, beyond which its middle is left out
 HEAD, TAIL = 64 << 10, 8 << 20  # what is kept of it
@@ -47,6 +44,11 @@ def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> 
 
 def summary(log: Path) -> str | None:
     """Steps, CPU time of a step on one rank, and the largest continuity error; None where no step was finished."""
+    # here, as importing PyFoam starts 19 processes
+    from PyFoam.LogAnalysis.ContinuityLineAnalyzer import GeneralContinuityLineAnalyzer
+    from PyFoam.LogAnalysis.ExecutionTimeLineAnalyzer import GeneralExecutionLineAnalyzer
+    from PyFoam.LogAnalysis.FoamLogAnalyzer import FoamLogAnalyzer
+
     analyzer = FoamLogAnalyzer()
     analyzer.addAnalyzer("time", GeneralExecutionLineAnalyzer(doFiles=False))
     analyzer.addAnalyzer("continuity", GeneralContinuityLineAnalyzer(doFiles=False))

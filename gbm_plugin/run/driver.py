@@ -32,8 +32,6 @@ from .words import closing, opening
 
 log = logging.getLogger(__name__)
 
-COMPLETE = "the run to time %g is complete; --fresh repeats it"
-
 
 class Carrier:
     """A flow on its way through time beside the fibers. All but `sample` and `on_cells` may be left as they are."""

@@ -29,11 +29,10 @@ from ..files import created
 from ..output.restarts import keep_earlier
 from ..signals import TELL, Asked, handled, kept_from_children
 from .continued import compare
-from .driver import COMPLETE
 from .progress import Progress, newest_row
 from .standstill import Pulse, kill_session, where_it_stands
 from .warnings import Warnings
-from .words import closing, opening
+from .words import COMPLETE, closing, opening
 
 log = logging.getLogger(__name__)
 

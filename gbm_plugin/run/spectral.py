@@ -26,7 +26,8 @@ from ..output.restarts import keep_earlier
 from ..scales import kolmogorov_length, taylor_reynolds
 from ..spectral import EswaranPope, LinearForcing, SpectralSolver
 from ..spectral.interpolation import WORDS
-from .driver import COMPLETE, Carrier, Run, results_folder
+from .driver import Carrier, Run, results_folder
+from .words import COMPLETE
 
 log = logging.getLogger(__name__)
 

@@ -22,7 +22,8 @@ from ..flow import StoredFlow, hdf5_flow
 from ..flow.grid import WORDS
 from ..flow.stored import SAME_TIME, refuse_gaps
 from ..output.stored import case_flow
-from .driver import COMPLETE, Carrier, Run, results_folder
+from .driver import Carrier, Run, results_folder
+from .words import COMPLETE
 
 log = logging.getLogger(__name__)
 

@@ -10,6 +10,8 @@ from ..report.summary import summary
 
 log = logging.getLogger(__name__)
 
+COMPLETE = "the run to time %g is complete; --fresh repeats it"
+
 
 def opening(scene: Scene, start_time: float, logs: str = "") -> None:
     """Cells, fibers, steps, and where the programs' own words go."""
