@@ -83,7 +83,7 @@ def make_case(
     initial: str | None = None,
     tight: bool = True,
     prepared: bool = True,
-    application: str = "pimpleFoam",
+    application: str = "boxFoam",
     viscosity: float = 0.01,
 ) -> Path:
     """A small copy of the default case: the same dictionaries, other numbers."""

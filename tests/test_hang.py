@@ -55,9 +55,9 @@ def test_stacks_of_a_solver_and_a_daemon(tmp_path):
     daemon.send_signal(signal.SIGSTOP)
     other = make_case(tmp_path / "other", timeout=1e6, tight=False)
     solver = start_solver(other)
-    until(lambda: "Starting time loop" in (other / "log.pimpleFoam").read_text(), "the solver's start")
+    until(lambda: "Starting time loop" in (other / "log.boxFoam").read_text(), "the solver's start")
     text = stacks()
     assert daemon.wait() == -signal.SIGABRT and solver.wait() != 0
     assert "in greet" in text and "coupling/sockets.py" in text
-    assert "Foam::sigQuit::sigHandler" in text and "pimpleFoam -case" in text
+    assert "Foam::sigQuit::sigHandler" in text and "boxFoam -case" in text
     assert "test_stacks_of_a_solver_and_a_daemon" in text

@@ -39,12 +39,12 @@ def home(tmp_path):
 def test_links_in_the_place_of_files(home, tmp_path):
     """A whole run, and its report, with every file that they write a link to one of the user's."""
     case = make_case(tmp_path / "case", steps=2, write_every=2, transport="tcp", prepared=False, tight=False)
-    names = ["log.pimpleFoam", "log.gbmDaemon", "log.blockMesh", "case.foam", "gbm.part", "gbm.tcp"]
+    names = ["log.boxFoam", "log.gbmDaemon", "log.blockMesh", "case.foam", "gbm.part", "gbm.tcp"]
     for name in names:
         (case / name).symlink_to(home / "thesis.tex")
     (case / "log.gbmDaemon.1").symlink_to(home / "made")  # dangling: nothing may be made there
     run_case(case)
-    assert "End" in (case / "log.pimpleFoam").read_text() and not (case / "log.pimpleFoam").is_symlink()
+    assert "End" in (case / "log.boxFoam").read_text() and not (case / "log.boxFoam").is_symlink()
     report(case)
 
 

@@ -73,7 +73,7 @@ def test_velocity_and_rotation_are_those_of_the_written_fields(case, positions):
 @pytest.mark.parametrize("scheme, below", [("cubic", 1), ("quintic", 2)])
 def test_lagranges_polynomials(case, positions, scheme, below):
     """Values and derivatives by scipy's polynomials through the cells around each bead, along each direction."""
-    path = case(steps=1, interpolation=scheme)
+    path = case(application="pimpleFoam", steps=1, interpolation=scheme)
     near = np.arange(-below, below + 2)
     _, samples = probe(path, positions, need="gradient")
     u = read(path, "0", "U", 3)
@@ -103,7 +103,9 @@ def test_order_of_the_interpolation(case, scheme, order):
     points = np.random.default_rng(3).uniform(0, BOX, (200, 3))
     errors = []
     for cells in (16, 32):
-        path = case(str(cells), steps=1, cells=cells, interpolation=scheme, initial=ABC)
+        path = case(
+            str(cells), application="pimpleFoam", steps=1, cells=cells, interpolation=scheme, initial=ABC
+        )
         _, samples = probe(path, points, need="gradient")
         _, velocity, gradient = samples[0]
         exact, slope = abc_flow(points)
@@ -147,7 +149,8 @@ def test_gradient_on_the_wire_is_du_i_dx_j(case):
 def test_samples_do_not_depend_on_the_decomposition(case, positions, division, scheme):
     """The fields are the same at step 0, so that samples agree to rounding, points on rank faces included."""
     ranks, n = division
-    serial, parallel = (case(name, steps=1, interpolation=scheme) for name in ("serial", "parallel"))
+    options = {"application": "pimpleFoam", "steps": 1, "interpolation": scheme}
+    serial, parallel = (case(name, **options) for name in ("serial", "parallel"))
     divide(parallel, ranks, n)
     _, expected = probe(serial, positions)
     _, found = probe(parallel, positions, ranks=ranks)
@@ -156,7 +159,7 @@ def test_samples_do_not_depend_on_the_decomposition(case, positions, division, s
 
 
 def test_a_rank_may_own_no_bead(case):
-    path = case(steps=1)
+    path = case(steps=1, application="pimpleFoam")
     divide(path, 4, (1, 1, 4))
     _, samples = probe(path, np.full((3, 3), 0.3), ranks=4)
     assert np.ptp(samples[0][1], axis=0).max() == 0
@@ -166,8 +169,8 @@ def test_a_rank_may_own_no_bead(case):
 def test_openfoams_own_schemes(case, positions, scheme):
     """Each is second order or, for `cell`, first order: near the trilinear values, and the same on two ranks."""
     path, parallel = (
-        case("serial", steps=1, interpolation=scheme),
-        case("parallel", steps=1, interpolation=scheme),
+        case("serial", application="pimpleFoam", steps=1, interpolation=scheme),
+        case("parallel", application="pimpleFoam", steps=1, interpolation=scheme),
     )
     divide(parallel, 2, (1, 1, 2))
     inside = positions[:40]
@@ -184,7 +187,7 @@ def test_openfoams_own_schemes(case, positions, scheme):
 
 def test_a_mesh_of_unequal_cells_is_searched(case):
     """Graded cells: trilinear is refused, cellPoint reproduces a field that is linear in the interior."""
-    path = case(steps=1, interpolation="cellPoint", prepared=False)
+    path = case(application="pimpleFoam", steps=1, interpolation="cellPoint", prepared=False)
     mesh = path / "system/blockMeshDict"
     mesh.write_text(mesh.read_text().replace("simpleGrading (1 1 1)", "simpleGrading (3 1 0.5)"))
     (path / "system/initialFieldDict").unlink()

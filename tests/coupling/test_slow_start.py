@@ -24,7 +24,7 @@ def test_the_solver_waits_knowingly(case):
     try:
         until(lambda: "waiting for OpenFOAM" in log.read_text() or daemon.poll() is not None, "its start")
         solver = start_solver(path)
-        said = (path / "log.pimpleFoam").read_text
+        said = (path / "log.boxFoam").read_text
         assert solver.wait() == 0, said()[-2000:]
         assert daemon.wait() == 0, log.read_text()[-2000:]
     finally:

@@ -45,7 +45,13 @@ def at_centres(force: EswaranPope, n: int) -> np.ndarray:
 
 def prepare(path, *, variance: float = 0.05, steps: int = 4, **options):
     """A case without fibers that writes every step in all digits."""
-    options = {"cells": CELLS, "time_step": STEP, "write_every": 1, "initial": ROUGH} | options
+    options = {
+        "cells": CELLS,
+        "time_step": STEP,
+        "write_every": 1,
+        "initial": ROUGH,
+        "application": "pimpleFoam",
+    } | options
     make_case(path, steps=steps, fv_options=entry(variance), **options)
     control = path / "system/controlDict"
     control.write_text(control.read_text().split("functions")[0])

@@ -29,6 +29,7 @@ SCHEMES = {
 
 def prepare(path, schemes=FACE_SUMS, ranks: int = 1, **options):
     """A case without fibers."""
+    options = {"application": "pimpleFoam"} | options
     make_case(path, **{"cells": CELLS, "steps": STEPS, "write_every": STEPS, "fv_options": POWER} | options)
     control = path / "system/controlDict"
     control.write_text(control.read_text().split("functions")[0])

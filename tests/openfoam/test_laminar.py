@@ -23,7 +23,7 @@ PISO = "PISO { nCorrectors 2; pRefCell 0; pRefValue 0; }\n"
 
 def prepare(path, model: str = "ours", **options):
     """A case without fibers and force."""
-    make_case(path, fv_options=FORCING, **options)
+    make_case(path, fv_options=FORCING, application="pimpleFoam", **options)
     control = path / "system/controlDict"
     control.write_text(control.read_text().split("functions")[0])
     (path / "constant/turbulenceProperties").write_text(

@@ -29,6 +29,7 @@ def run(path, modes: str, fv_options: str, time_step: float = 0.02, steps: int =
         write_every=steps,
         fv_options=fv_options,
         initial=f"field modes; modes ({modes});",
+        application="pimpleFoam",
         **options,
     )
     control = path / "system/controlDict"
@@ -137,7 +138,7 @@ def test_a_restart_continues_the_forcing(tmp_path):
 def test_wrong_entries_are_named(tmp_path, option, message):
     from gbm_plugin.case.openfoam import fatal_message
 
-    path = make_case(tmp_path / "case", cells=4, steps=1, initial="field ABC;")
+    path = make_case(tmp_path / "case", cells=4, steps=1, initial="field ABC;", application="pimpleFoam")
     (path / "constant/fvOptions").write_text(HEADER + option)
     assert start_solver(path).wait() != 0
     text = fatal_message(path / "log.pimpleFoam")

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.openfoam
 def test_a_step_takes_few_bytes(tmp_path):
     """Times, Courant numbers and continuity, and not the residuals of ten linear solves: 10⁶ steps stay below 1 GB."""
     steps = 10
-    path = make_case(tmp_path / "case", steps=steps, tight=False)
+    path = make_case(tmp_path / "case", steps=steps, tight=False, application="pimpleFoam")
     (path / "constant/fiberProperties").unlink()
     control = path / "system/controlDict"
     head, _, rest = control.read_text().partition("functions")

@@ -76,7 +76,13 @@ def box(tmp_path):
         renumber: bool = False,
     ) -> Path:
         path = make_case(
-            tmp_path / name, steps=steps, write_every=STEPS, tight=False, prepared=False, fv_options=""
+            tmp_path / name,
+            steps=steps,
+            write_every=STEPS,
+            tight=False,
+            prepared=False,
+            fv_options="",
+            application="pimpleFoam",
         )
         control = path / "system/controlDict"
         text = control.read_text()

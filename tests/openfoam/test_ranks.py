@@ -15,8 +15,8 @@ from probe import probe
 pytestmark = pytest.mark.openfoam
 
 LAYERS = 20
-UNEVEN = [(3, "x"), (3, "y"), (3, "z"), (7, "z")]
-ALL = [(ranks, d) for ranks in range(2, 9) for d in "xyz"]
+SLABS = [(2, "x"), (3, "y"), (4, "z"), (5, "x"), (6, "y"), (7, "z"), (8, "x")]  # each number, each direction
+LAYERED = [(2, "z"), (3, "z"), (4, "x"), (5, "z"), (5, "y"), (8, "z")]
 POSITIONS = np.random.default_rng(1).uniform(0, 2 * np.pi, (40, 3))
 
 
@@ -27,16 +27,15 @@ def blocks(ranks: int, direction: str) -> tuple[int, int, int]:
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory):
     """Forcing, leanCubic and fibers of the default case with stock solvers of the linear equations."""
-    path = make_case(tmp_path_factory.mktemp("ranks") / "serial", cells=LAYERS, steps=2)
+    path = make_case(
+        tmp_path_factory.mktemp("ranks") / "serial", cells=LAYERS, steps=2, application="pimpleFoam"
+    )
     return probe(path, POSITIONS)[1]
 
 
-@pytest.mark.parametrize(
-    ("ranks", "direction"),
-    [pytest.param(*case, marks=() if case in UNEVEN else pytest.mark.slow) for case in ALL],
-)
+@pytest.mark.parametrize(("ranks", "direction"), SLABS)
 def test_any_slabs_give_the_serial_samples(case, serial, ranks, direction):
-    path = case(cells=LAYERS, steps=2)
+    path = case(cells=LAYERS, steps=2, application="pimpleFoam")
     divide(path, ranks, blocks(ranks, direction))
     samples = probe(path, POSITIONS, ranks=ranks)[1]
     assert sorted(samples) == sorted(serial)
@@ -45,13 +44,10 @@ def test_any_slabs_give_the_serial_samples(case, serial, ranks, direction):
         np.testing.assert_allclose(samples[step][2], rotation, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("ranks", "direction"),
-    [pytest.param(*case, marks=() if case in UNEVEN[1:3] else pytest.mark.slow) for case in ALL],
-)
+@pytest.mark.parametrize(("ranks", "direction"), LAYERED)
 def test_transforms_run_on_even_slabs_of_z_and_refuse_others(case, ranks, direction):
     """The pressure of the default case: FFTW-MPI holds whole layers of z, equally many on each rank."""
-    path = case(cells=LAYERS, steps=2, tight=False)
+    path = case(cells=LAYERS, steps=2, application="pimpleFoam", tight=False)
     (path / "constant/fiberProperties").unlink()
     control = path / "system/controlDict"
     text = control.read_text()

@@ -12,11 +12,13 @@ from conftest import divide, make_case, set_entry, start_solver
 
 pytestmark = pytest.mark.openfoam
 
-STEPS, TIME = 5, "0.1"
+STEPS, TIME = 2, "0.04"
 
 
 def prepare(path, convection: str, **options):
-    make_case(path, **{"cells": 12, "steps": STEPS, "write_every": STEPS} | options)
+    make_case(
+        path, **{"cells": 12, "steps": STEPS, "write_every": STEPS, "application": "pimpleFoam"} | options
+    )
     control = path / "system/controlDict"
     control.write_text(control.read_text().split("functions")[0])
     set_entry(path / "system/fvSchemes", "div(phi,U)", convection)

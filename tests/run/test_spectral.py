@@ -32,7 +32,9 @@ def results(path):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    path = make_case(tmp_path_factory.mktemp("whole") / "case", cells=24, prepared=False)
+    path = make_case(
+        tmp_path_factory.mktemp("whole") / "case", cells=24, prepared=False, application="pimpleFoam"
+    )
     run_case(path, *SPECTRAL)
     return path
 
@@ -81,7 +83,7 @@ def test_openfoam_agrees_with_that_mesh(whole):
     folder = whole / "spectral"
     utility(folder, "checkMesh")
     assert "Mesh OK" in (folder / "log.checkMesh").read_text()
-    made = make_case(whole.parent / "made", cells=24)
+    made = make_case(whole.parent / "made", cells=24, application="pimpleFoam")
     for name in ("points", "owner", "neighbour"):
         ours, theirs = (read_list(case / "constant/polyMesh" / name) for case in (folder, made))
         assert len(ours) == len(theirs)
@@ -129,7 +131,9 @@ ESWARAN_POPE = "stirring { type eswaranPope; variance 5e-3; timeScale 0.5; cutof
 @pytest.mark.openfoam
 def test_one_force_in_both_engines(tmp_path):
     """The same entry drives both; each has its table under the entry's name. From one field, one power at t = 0."""
-    path = make_case(tmp_path / "case", steps=5, prepared=False, fv_options=ESWARAN_POPE)
+    path = make_case(
+        tmp_path / "case", steps=5, prepared=False, fv_options=ESWARAN_POPE, application="pimpleFoam"
+    )
     run_case(path)
     run_case(path, *SPECTRAL)
     openfoam, spectral = read_forcing(path), read_forcing(path / "spectral")

@@ -48,7 +48,13 @@ def distance(case):
 @pytest.fixture(scope="module")
 def live(tmp_path_factory):
     """A run that wrote every step, in binary; to be copied, not changed."""
-    path = make_case(tmp_path_factory.mktemp("live") / "case", steps=STEPS, write_every=1, tight=False)
+    path = make_case(
+        tmp_path_factory.mktemp("live") / "case",
+        steps=STEPS,
+        write_every=1,
+        tight=False,
+        application="pimpleFoam",
+    )
     run_case(path)
     return path
 
@@ -74,7 +80,14 @@ def test_the_replay_of_every_step_is_the_run_itself(case):
 
 def test_the_replay_of_a_cubic_run_is_the_run_itself(tmp_path):
     """The same interpolation, and derivatives, in C++ and in Python."""
-    case = make_case(tmp_path / "case", steps=STEPS, write_every=1, tight=False, interpolation="cubic")
+    case = make_case(
+        tmp_path / "case",
+        steps=STEPS,
+        write_every=1,
+        tight=False,
+        interpolation="cubic",
+        application="pimpleFoam",
+    )
     run_case(case)
     run_case(case, *REPLAY)
     apart, _ = distance(case)

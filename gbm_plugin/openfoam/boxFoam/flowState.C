@@ -1,5 +1,7 @@
 #include "flowState.H"
 
+#include <cmath>
+
 namespace Foam
 {
     defineTypeNameAndDebug(flowState, 0);
@@ -77,6 +79,16 @@ Foam::string Foam::flowState::take(Istream& is)
 
 void Foam::flowState::start(volVectorField& U)
 {
+    forAll(U, celli)
+    {
+        if (!std::isfinite(mag(U[celli])))
+        {
+            FatalErrorInFunction
+                << U.objectPath() << " is not finite in cell " << celli
+                << exit(FatalError);
+        }
+    }
+
     string problem;
     bool found = typeHeaderOk<flowState>(false);
 
