@@ -135,7 +135,7 @@ def test_code_of_changed_sources_is_not_used(installation, tmp_path):
 
 def test_kernels_that_are_kept_load_without_the_compiler():
     """And the process that watches a run loads no kernels at all: a run starts a second sooner."""
-    run("from gbm_plugin.prepare import prepare; prepare()")
+    run(CONTACTS)
     script = CONTACTS + 'import sys; print("here:", *("numba.np.arraymath" in sys.modules,))'
     assert run(script).split("here:")[1].split() == ["False"]
     script = "import gbm_plugin.run.openfoam, sys; sys.exit(any(name in sys.modules for name in ('numba', 'PyFoam')))"

@@ -339,6 +339,7 @@ class Stepper:
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
         self._tensions[:] = tension.reshape(-1)[: fibers.count]
+        self._multipliers[:] = self._last_multipliers  # from which a later implicit step goes on
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
         self._count(count, error if self.integrator == "ab3" else error[:0])

@@ -108,7 +108,11 @@ class Scene:
     def fibers(self, positions: NDArray) -> Fibers:
         """The family of these positions."""
         words = {"bending_torque": self.bending_torque, "curvature_law": self.curvature_law}
-        return Fibers(positions, self.bending_stiffness, 1.0, **words)
+        fibers = Fibers(positions, self.bending_stiffness, 1.0, **words)
+        fibers.radius = self.length / (
+            2 * self.beads
+        )  # not to the rounding of positions: restarts are to the bit
+        return fibers
 
     def stepper(self, positions: NDArray, start: float) -> Stepper:
         """A stepper for fibers at these positions from time start on."""

@@ -281,8 +281,8 @@ def test_other_number_of_ranks_at_each_restart(make):
 
 
 def test_parallel_run_killed_and_continued(make):
-    steps = 400  # as many as surely leave the time to kill it
-    case = make(application="boxFoam", steps=steps, write_every=50)
+    steps = 250  # as many as surely leave the time to kill it
+    case = make(application="boxFoam", cells=12, steps=steps, write_every=50)
     shutil.copytree(case, case.with_name("serial"))
     run_case(case.with_name("serial"))
     Run(case, "--parallel").killed_at(70)

@@ -15,7 +15,7 @@ SLOW_START = Path(__file__).with_name("slow_start.py")
 
 
 def test_the_solver_waits_knowingly(case):
-    timeout = 6
+    timeout = 3
     path = case(cells=12, steps=2, timeout=timeout)
     log = path / "log.gbmDaemon"
     with log.open("w") as output:

@@ -42,7 +42,7 @@ def whole(tmp_path_factory):
 @pytest.mark.openfoam
 def test_both_engines_agree(whole, tmp_path):
     """The same initial modes, forcing and seeds; after 0.4 time units apart by the error of 24^3 cells."""
-    path = make_case(tmp_path / "case", cells=24, tight=False)
+    path = make_case(tmp_path / "case", cells=24, tight=False, application="pimpleFoam")
     run_case(path)
     flow = read_dat(path / "postProcessing/linearForcing", "linearForcing.dat")
     with open_recording(path / "postProcessing/fibers") as recording:
@@ -64,8 +64,7 @@ def test_the_budget_closes(whole):
 
 
 def test_the_results_are_a_case(whole):
-    done = gbm("report", whole / "spectral")
-    assert done.returncode == 0, done.stderr
+    assert "fibers.png" in report(whole / "spectral")["files"]
     assert (whole / "spectral/report/fibers.png").is_file()
 
 
@@ -180,7 +179,7 @@ def test_openfoam_begins_from_the_same_modes(tmp_path):
     """At its centres of cells."""
     coarse = make_case(tmp_path / "whole", cells=16, steps=4, prepared=False, fv_options=ESWARAN_POPE)
     run_case(coarse, *SPECTRAL)
-    fine = begun(tmp_path / "fine", cells=24)
+    fine = begun(tmp_path / "fine", cells=24, application="pimpleFoam")
     run_case(fine)
     table = read_forcing(fine)
     assert table["k"][0] == pytest.approx(read_forcing(coarse / "spectral")["k"][-1], rel=1e-10)

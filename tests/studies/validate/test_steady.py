@@ -43,6 +43,7 @@ def test_long_viscous_steps_of_the_default_case_are_stable(tmp_path):
         "one { count 1; beads 2; length 0.1; bendingStiffness 0; }",
     )
     sizes = {"cells": cells, "steps": steps, "time_step": step, "tight": False, "prepared": False}
+    sizes |= {"application": "pimpleFoam"}
     case = make_case(tmp_path / "case", **sizes, fv_options=forcing, initial=steady.FLOW, families=nobody)
     set_entry(case / "constant/transportProperties", "nu", str(viscosity))
     run_case(case)
