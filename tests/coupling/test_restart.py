@@ -281,11 +281,11 @@ def test_other_number_of_ranks_at_each_restart(make):
 
 
 def test_parallel_run_killed_and_continued(make):
-    steps = 250  # as many as surely leave the time to kill it
-    case = make(application="boxFoam", cells=12, steps=steps, write_every=50)
+    steps = 120  # as many as surely leave the time to kill it
+    case = make(application="boxFoam", cells=12, steps=steps, write_every=30)
     shutil.copytree(case, case.with_name("serial"))
     run_case(case.with_name("serial"))
-    Run(case, "--parallel").killed_at(70)
+    Run(case, "--parallel").killed_at(40)
     done = run_case(case, "--parallel")
     assert "continuing from" in done.stdout or "falling back to" in done.stdout
     time = steps * TIME_STEP

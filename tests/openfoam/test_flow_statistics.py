@@ -17,7 +17,7 @@ from conftest import divide, make_case, start_solver
 
 pytestmark = pytest.mark.openfoam
 
-NU, CELLS, STEPS, TIME = 0.01, 12, 4, "0.08"
+NU, CELLS, STEPS, TIME = 0.01, 12, 2, "0.04"
 POWER = "linearForcing { type linearForcing; mode constantPower; power 0.05; }"
 FACE_SUMS = ("Gauss linear", "orthogonal")
 SCHEMES = {

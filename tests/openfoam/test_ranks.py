@@ -28,14 +28,14 @@ def blocks(ranks: int, direction: str) -> tuple[int, int, int]:
 def serial(tmp_path_factory):
     """Forcing, leanCubic and fibers of the default case with stock solvers of the linear equations."""
     path = make_case(
-        tmp_path_factory.mktemp("ranks") / "serial", cells=LAYERS, steps=2, application="pimpleFoam"
+        tmp_path_factory.mktemp("ranks") / "serial", cells=LAYERS, steps=1, application="pimpleFoam"
     )
     return probe(path, POSITIONS)[1]
 
 
 @pytest.mark.parametrize(("ranks", "direction"), SLABS)
 def test_any_slabs_give_the_serial_samples(case, serial, ranks, direction):
-    path = case(cells=LAYERS, steps=2, application="pimpleFoam")
+    path = case(cells=LAYERS, steps=1, application="pimpleFoam")
     divide(path, ranks, blocks(ranks, direction))
     samples = probe(path, POSITIONS, ranks=ranks)[1]
     assert sorted(samples) == sorted(serial)

@@ -34,7 +34,7 @@ def solve(path, ranks: int = 1) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "grading, ranks, n",
-    [("2 1 0.5", 1, None), ("2 1 0.5", 2, (2, 1, 1)), ("1 1 1", 1, None), ("1 1 1", 4, (2, 1, 2))],
+    [("2 1 0.5", 1, None), ("2 1 0.5", 2, (2, 1, 1)), ("1 1 1", 1, None), ("1 1 1", 2, (1, 2, 1))],
     ids=["graded", "graded on ranks", "uniform", "uniform on ranks"],
 )
 def test_the_values_of_cubic(tmp_path, grading, ranks, n):
