@@ -12,7 +12,7 @@ from conftest import divide, make_case, set_entry, start_solver
 
 pytestmark = pytest.mark.openfoam
 
-STEPS, TIME = 2, "0.04"
+STEPS, TIME = 1, "0.02"
 
 
 def prepare(path, convection: str, **options):
