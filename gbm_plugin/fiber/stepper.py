@@ -80,9 +80,7 @@ class Stepper:
         self._ages: list[float] = []
         self._last_step = np.full(fibers.count, np.inf)  # suggested to each fiber
         self._step = self._last_step.copy()
-        self._tensions = np.zeros(
-            fibers.count
-        )  # over 6πμa, of each fiber in the last step, and their largest
+        self._tensions = np.zeros(fibers.count)  # over 6πμa, in the last step; and their largest
         self._last_tension = 0.0
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
@@ -295,16 +293,20 @@ class Stepper:
                     f"{MOST_SUBSTEPS} are allowed: take the implicit integrator"
                 )
             self._followed(self._explicit(count), count)
-            self._tension = float(self._tensions.max())
-            return
+        else:
+            self._by_turns(count)
+        self._tension = float(self._tensions.max())
+
+    def _by_turns(self, count: int) -> None:
+        """By ab3 where its count sub-steps are affordable, and by implicit steps what is left or all."""
         everyone = np.arange(self.fibers.count)
         if count <= AFFORDABLE * np.clip(self._length / self._step, 1, DIVIDED).mean():
             error = self._explicit(count)
+            self._multipliers[:] = self._last_multipliers  # from which a later implicit step goes on
             self._implicit(everyone[~(error <= self.tolerance)])
         else:
             self._ages = []
             self._implicit(everyone)
-        self._tension = float(self._tensions.max())
 
     def _substeps(self) -> int:
         """Sub-steps that keep ab3 stable: eq. (10), less for bent discrete rods and under great tension."""
@@ -339,7 +341,6 @@ class Stepper:
         self._rates = [new, self._last_rates[0] if count == 1 else old]
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
         self._tensions[:] = tension.reshape(-1)[: fibers.count]
-        self._multipliers[:] = self._last_multipliers  # from which a later implicit step goes on
         error = error.reshape(-1)[: fibers.count]
         self._finite(error)
         self._count(count, error if self.integrator == "ab3" else error[:0])

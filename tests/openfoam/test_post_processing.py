@@ -88,15 +88,14 @@ def test_the_whole_list_of_function_objects_runs_in_post_processing(finished):
 
 
 def test_report_and_fiber_series(reported, recording):
-    finished = reported
     for name in ("energy.png", "spectrum.png", "end_to_end.png", "fibers.png", "flow.csv", "report.json"):
-        assert (finished / "report" / name).stat().st_size > 100
-    assert (finished / "report/fibers_wrapped.pvd").is_file()
-    pieces = len(list((finished / "report/unwrapped").glob("*.vtp")))
+        assert (reported / "report" / name).stat().st_size > 100
+    assert (reported / "report/fibers_wrapped.pvd").is_file()
+    pieces = len(list((reported / "report/unwrapped").glob("*.vtp")))
     assert pieces == len(recording.times)
     first, last = (line_mesh(recording, row, wrapped=False) for row in (0, pieces - 1))
-    last.write(finished / "last.vtu")
-    last = meshio.read(finished / "last.vtu")
+    last.write(reported / "last.vtu")
+    last = meshio.read(reported / "last.vtu")
     np.testing.assert_allclose(last.points, last_positions(recording), atol=1e-12)
     assert np.abs(last.points - first.points).max() > 0.01
     assert last.cells_dict["line"].shape == (5 * 5 + 3 * 3, 2)
@@ -104,9 +103,8 @@ def test_report_and_fiber_series(reported, recording):
 
 def test_the_report_completes_the_cloud(reported, recording):
     """With what the series of polylines has, at all written times; the state at a time gives the recorded tension."""
-    finished = reported
     for name, row in (("0.1", 5), ("0.2", 10)):
-        cloud = finished / name / "lagrangian/fibers"
+        cloud = reported / name / "lagrangian/fibers"
         labels = {label: read_list(cloud / label) for label in ("family", "fiber", "bead")}
         order = in_fleets_order(labels)
         lines = polylines(recording, row, wrapped=False).point_data
@@ -120,18 +118,17 @@ def test_the_report_completes_the_cloud(reported, recording):
         [(f.positions[6] - f.positions[4]).reshape(-1, 3) / (2 * 0.02) for f in recording.families.values()]
     )
     assert np.abs(velocity - central).max() < 2e-3 * np.abs(central).max()
-    written = (finished / "0.1/lagrangian/fibers/stiffness").stat().st_mtime_ns
-    assert complete_clouds(read_scene(finished)) == []  # once is enough
-    assert (finished / "0.1/lagrangian/fibers/stiffness").stat().st_mtime_ns == written
+    written = (reported / "0.1/lagrangian/fibers/stiffness").stat().st_mtime_ns
+    assert complete_clouds(read_scene(reported)) == []  # once is enough
+    assert (reported / "0.1/lagrangian/fibers/stiffness").stat().st_mtime_ns == written
 
 
 def test_openfoam_reads_the_completed_cloud(reported):
-    finished = reported
-    utility(finished, "foamToVTK", "-latestTime", "-ascii", "-overwrite")
-    cloud = ElementTree.parse(next(finished.glob("VTK/lagrangian/fibers/*.vtp")))
+    utility(reported, "foamToVTK", "-latestTime", "-ascii", "-overwrite")
+    cloud = ElementTree.parse(next(reported.glob("VTK/lagrangian/fibers/*.vtp")))
     arrays = {a.get("Name"): np.array(a.text.split(), float) for a in cloud.iter("DataArray") if a.text}
     for field in ("curvature", "velocity", "radius", "stiffness", "tension"):
-        there = read_list(finished / "0.2/lagrangian/fibers" / field).ravel()
+        there = read_list(reported / "0.2/lagrangian/fibers" / field).ravel()
         np.testing.assert_allclose(arrays[field], there, rtol=1e-5, atol=1e-12)
 
 
