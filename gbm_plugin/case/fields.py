@@ -20,13 +20,8 @@ class FourierModes:
     def on_lattice(self, cells: tuple[int, int, int], offset: float = 0.0) -> np.ndarray:
         """Velocity (3, nx, ny, nz) at x_i = (i + offset) box/n: offset 0 for spectral nodes, 1/2 for cell
         centres. ValueError where the cells are too few for the highest mode."""
+        self.must_fit(cells)
         cells = np.asarray(cells)
-        highest = np.abs(self.wavevectors).max(axis=0, initial=0)
-        if np.any(2 * highest >= cells):
-            raise ValueError(
-                f"the initial field has modes up to {tuple(map(int, highest))} in x, y, z, which "
-                f"{tuple(map(int, cells))} cells cannot hold: more than twice as many are needed"
-            )
         phase = np.exp(2j * np.pi * offset * (self.wavevectors / cells).sum(axis=1))
         index = tuple(self.wavevectors.T % cells[:, None])
         out = np.empty((3, *cells))
@@ -35,6 +30,15 @@ class FourierModes:
             np.add.at(half, index, self.amplitudes[:, component] * phase)
             out[component] = np.fft.ifftn(half).real * cells.prod()
         return out
+
+    def must_fit(self, cells: tuple[int, int, int]) -> None:
+        """ValueError where the cells are too few for the highest mode."""
+        highest = np.abs(self.wavevectors).max(axis=0, initial=0)
+        if np.any(2 * highest >= cells):
+            raise ValueError(
+                f"the initial field has modes up to {tuple(map(int, highest))} in x, y, z, which "
+                f"{tuple(map(int, cells))} cells cannot hold: more than twice as many are needed"
+            )
 
     @property
     def kinetic_energy(self) -> float:

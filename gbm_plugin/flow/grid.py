@@ -96,6 +96,11 @@ def lagrange(share, shares, nodes, points, scale, out):
             out[p, m], out[p, m + 1], out[p, m + 2] = a, b, c
 
 
+def nodes_of(word: str) -> int:
+    """How many nodes in each direction a word takes."""
+    return LAGRANGE.get(word, 2)
+
+
 def _scale(word: str) -> NDArray:
     """1/prod_{r != q} (q - r) of the nodes q = 0, 1, ... of a word of `LAGRANGE`."""
     nodes = np.arange(LAGRANGE[word])

@@ -89,7 +89,8 @@ def _set_initial(scene: Scene, solver: SpectralSolver) -> None:
             f"{scene.case}/system/initialFieldDict: the forcing {scene.forcing.name} has nothing to force, k = 0"
         )
     try:
-        solver.set_velocity(modes.on_lattice(scene.cells, offset=0.0))
+        modes.must_fit(scene.cells)
+        solver.set_modes(modes.wavevectors, modes.amplitudes)
         if force and solver.forcing.forms():
             solver.forcing.restore(force)
     except ValueError as error:
@@ -178,7 +179,7 @@ class _SpectralFlow(Carrier):
         reynolds = taylor_reynolds(u, nu, dissipation)
         eta = kolmogorov_length(nu, dissipation)
         coefficient = power / (2 * energy) if energy > 0 else 0.0
-        mean = self.solver.coefficients[:, 0, 0, 0].real
+        mean = self.solver.mean
         row = (time, energy, balance, dissipation, dissipation, u, reynolds, eta, coefficient, power, *mean)
         row += (exchange,) if self.scene.coupling.feedback else ()
         self.table.write("\t".join(f"{x:.12g}" for x in row) + "\n")

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gbm_plugin.flow import grid
 from gbm_plugin.spectral.modes import Modes
 
 Array = Any  # numpy.ndarray or cupy.ndarray
 Term = tuple[float, float, Array]  # coefficient, delay, modes
+POINTS = 1 << 17  # that are interpolated at once
 
 
 class Arrays:
@@ -92,7 +94,10 @@ class Arrays:
         divergence = self.xp.stack(
             [kx * xx + ky * xy + kz * xz, kx * xy + ky * yy + kz * yz, kx * xz + ky * yz]
         )
-        out[:] = self.project(self.real.type(linear) * u - 1j * divergence)
+        divergence *= -1j
+        if linear:
+            divergence += self.real.type(linear) * u
+        out[:] = self.project(divergence)
 
     def combine(self, out: Array, terms: list[Term]) -> float:
         """out = sum of coefficient exp(-nu k^2 delay) modes over terms; returns its fluctuation energy."""
@@ -110,6 +115,30 @@ class Arrays:
         """Energy of each stored mode together with its conjugate, in double precision."""
         squares = (u.real.astype(np.float64) ** 2 + u.imag.astype(np.float64) ** 2).sum(axis=0)
         return 0.5 * squares * self.xp.asarray(self.modes.weights)
+
+    def dissipation(self, u: Array) -> float:
+        """2 nu times the enstrophy's integrand over the modes, sum nu k^2 |u_k|^2."""
+        return 2 * self.viscosity * float((self.k_squared * self.mode_energy(u)).sum())
+
+    def mean(self, u: Array) -> NDArray:
+        """<u> (3,), complex as stored, in main memory."""
+        return self.host(u[:, 0, 0, 0])
+
+    def shifted(self, u: Array, fraction: float) -> Array:
+        """Modes of u(x + fraction of a cell in each direction)."""
+        step = fraction * self.modes.box / self.modes.cells
+        i, j, k = (self.xp.asarray(np.exp(1j * axis * step)) for axis in self.modes.k)
+        return (u * (i * j * k)).astype(self.complex)
+
+    def at(self, word: str, fields: Array, points: NDArray, threads: int = 1) -> NDArray:
+        """Fields (m, n, n, n) at points (P, 3) in units of cells, by a word of `flow.grid`: (P, m), in main memory."""
+        parts = [
+            self.host(
+                _lagrange(self.xp, grid.nodes_of(word), fields, self.xp.asarray(points[i : i + POINTS]))
+            )
+            for i in range(0, len(points), POINTS)
+        ]
+        return np.concatenate(parts) if parts else np.empty((0, len(fields)))
 
     def close(self, u: Array) -> None:
         """Restore c(-k) = conj c(k) where both are stored, at kz = 0: rounding would let them part."""
@@ -132,3 +161,19 @@ class Arrays:
     def host(self, a: Array) -> NDArray:
         """The array in main memory."""
         return a.get() if hasattr(a, "get") else a
+
+
+def _lagrange(xp: ModuleType, width: int, fields: Array, points: Array) -> Array:
+    """Lagrange's polynomials through the `width` nearest nodes in each direction, of fields (m, n, n, n): (P, m)."""
+    n, nodes = fields.shape[1], np.arange(width)
+    low = xp.floor(points) - (width // 2 - 1)
+    s = points - low
+    weights = xp.ones((*points.shape, width))
+    for q in nodes:
+        for r in nodes[nodes != q]:
+            weights[..., q] *= (s - r) / (q - r)
+    x, y, z = ((low.astype(np.int64)[..., None] + xp.asarray(nodes)) % n).swapaxes(0, 1)
+    place = (x[:, :, None, None] * n + y[:, None, :, None]) * n + z[:, None, None, :]
+    wx, wy, wz = weights.swapaxes(0, 1)
+    weight = wx[:, :, None, None] * wy[:, None, :, None] * wz[:, None, None, :]
+    return xp.stack([(field.reshape(-1)[place] * weight).sum(axis=(1, 2, 3)) for field in fields], axis=1)

@@ -9,11 +9,6 @@ from ..flow import grid
 WORDS = (*grid.WORDS, "exact")
 
 
-def on_grid(word: str, fields: NDArray, positions: NDArray, box: float, threads: int = 1) -> NDArray:
-    """Interpolate fields (m, n, n, n) at positions (P, 3), which need not lie inside the box: (P, m)."""
-    return grid.on_grid(word, fields, positions * (fields.shape[1] / box), threads)
-
-
 def spread_on_grid(
     word: str,
     values: NDArray,
@@ -23,7 +18,7 @@ def spread_on_grid(
     threads: int = 1,
     out: NDArray | None = None,
 ) -> NDArray:
-    """Densities (m, n, n, n) of point values (P, m), by the transpose of `on_grid`; out: as in `grid.spread`."""
+    """Densities (m, n, n, n) of point values (P, m) by the transpose of `flow.grid.on_grid`; out as in its `spread`."""
     scale = cells / box
     return grid.spread(word, values * scale**3, positions * scale, (cells, cells, cells), threads, out)
 

@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pyfftw
 
+from gbm_plugin.flow import grid
 from gbm_plugin.spectral import kernels
 from gbm_plugin.spectral.arrays import Arrays, Term
 from gbm_plugin.spectral.modes import Modes
@@ -108,6 +109,9 @@ class Slabs(Arrays):
             self._each_block(join)
             self._each_column_block(finish)
         return out
+
+    def at(self, word, fields, points, threads=1):
+        return grid.on_grid(word, fields, points, threads)
 
     def loads(self, modes):
         out = self.zeros()

@@ -97,13 +97,32 @@ class SpectralSolver:
             raise ValueError(f"velocity must have shape (3, {n}, {n}, {n}), got {u.shape}")
         if not np.isfinite(u).all():
             raise ValueError("velocity must be finite everywhere")
-        modes = self.operators.to_modes(u)
+        self._set(self.operators.to_modes(u))
+
+    def _set(self, modes: Array) -> None:
         self._u = self.operators.project(modes)
         self._u[:, 0, 0, 0] = modes[:, 0, 0, 0].real
         self.operators.close(self._u)
         self._energy = self.operators.energy(self._u)
         self._stepper.forget()
         self._discard_fields()
+
+    def set_modes(self, wavevectors: ArrayLike, amplitudes: ArrayLike) -> None:
+        """Set the velocity to the solenoidal, resolved part of Re sum a exp(2 pi i m.x/box), from whole m (M, 3) and
+        complex a (M, 3)."""
+        m, a = np.asarray(wavevectors), np.asarray(amplitudes, complex)
+        if m.shape != a.shape or m.shape[1:] != (3,):
+            raise ValueError(f"wavevectors and amplitudes must both be (M, 3), got {m.shape} and {a.shape}")
+        if not np.isfinite(a).all():
+            raise ValueError("amplitudes must be finite")
+        modes, cut = np.zeros((3, *self.modes.shape), complex), self.modes.cut
+        resolved = (abs(m) <= cut).all(axis=1)
+        for sign, values in ((1, a), (-1, a.conj())):
+            k = sign * m
+            stored = resolved & (k[:, 2] >= 0)
+            for component, c in zip(modes, values.T, strict=True):
+                np.add.at(component, tuple(k[stored].T), c[stored] / 2)
+        self._set(self.operators.xp.asarray(modes.astype(self.operators.complex)))
 
     @property
     def velocity(self) -> NDArray:
@@ -112,10 +131,13 @@ class SpectralSolver:
 
     def shifted_velocity(self, fraction: float) -> NDArray:
         """Velocity (3, n, n, n) at ((i, j, k) + fraction) box/n: 1/2 for the centres of the cells between nodes."""
-        i, j, k = (np.exp(1j * axis * fraction * self.box / self.cells) for axis in self.modes.k)
-        modes = self.operators.xp.asarray(self.coefficients * (i * j * k))
-        u = self.operators.to_physical(modes.astype(self._u.dtype))
+        u = self.operators.to_physical(self.operators.shifted(self._u, fraction))
         return np.ascontiguousarray(self.operators.host(u))
+
+    @property
+    def mean(self) -> NDArray:
+        """Mean velocity (3,)."""
+        return self.operators.mean(self._u).real.astype(float)
 
     @property
     def coefficients(self) -> NDArray:
@@ -191,7 +213,7 @@ class SpectralSolver:
     @property
     def _rounding(self) -> float:
         """Of the energy of fluctuations, beside that of the mean."""
-        mean = self.operators.host(self._u[:, 0, 0, 0])
+        mean = self.operators.mean(self._u)
         return 1e3 * np.finfo(self._u.dtype).eps * float((abs(mean) ** 2).sum())
 
     def spectrum(self) -> tuple[NDArray, NDArray]:
@@ -208,7 +230,7 @@ class SpectralSolver:
         operators, u = self.operators, self._u
         slopes = operators.xp.stack([operators.derivative(u[i], i) for i in range(3)])
         return (
-            turbulence.scales(*self.spectrum(), self._dissipation(), self.viscosity)
+            turbulence.scales(*self.spectrum(), operators.dissipation(u), self.viscosity)
             | turbulence.gradient_moments(operators.host(operators.to_physical(slopes)))
             | {"power": self.forcing.input(u, self._energy)}
         )
@@ -219,7 +241,7 @@ class SpectralSolver:
         return {
             "kinetic_energy": self._energy,
             "power": self.forcing.input(self._u, self._energy),
-            "dissipation": self._dissipation(),
+            "dissipation": self.operators.dissipation(self._u),
             "exchange": float(self._mode_exchange().sum()),
         }
 
@@ -353,9 +375,6 @@ class SpectralSolver:
                 stacklevel=5,
             )
 
-    def _dissipation(self) -> float:
-        return 2 * self.viscosity * float((self.modes.k_squared * self._mode_energy()).sum())
-
     def _mode_energy(self) -> NDArray:
         return self.operators.host(self.operators.mode_energy(self._u))
 
@@ -382,8 +401,8 @@ class SpectralSolver:
         """Three fields at points (P, 3): (P, 3)."""
         if self.interpolation == "exact":
             return interpolate.fourier_sum(self.operators.host(modes()), points, self.box, self._threads)
-        fields = self.operators.host(self._physical(name, modes))
-        return interpolate.on_grid(self.interpolation, fields, points, self.box, self._threads)
+        scaled = points * (self.cells / self.box)
+        return self.operators.at(self.interpolation, self._physical(name, modes), scaled, self._threads)
 
 
 def _operators(device: str, modes: Modes, viscosity: float, precision: str, threads: int) -> Arrays:
