@@ -57,12 +57,12 @@ def test_fibers_ride(tmp_path, options):
 
 
 def test_ranks_agree(tmp_path):
-    """To rounding, also where the layers do not divide evenly and cells have another order."""
+    """To rounding, also where the layers do not divide evenly and cells have another order, by memory or messages."""
     one = box_case(tmp_path / "one", order=4, cells=10, steps=10, fv_options=POWER)
     run(one)
     u = velocity(one, "0.2", 10)
-    for ranks in (2, 3):
-        many = box_case(tmp_path / str(ranks), order=4, cells=10, steps=10, fv_options=POWER)
+    for ranks, shared in ((2, 1), (3, 1), (3, 0)):
+        many = box_case(tmp_path / f"{ranks}{shared}", order=4, cells=10, steps=10, fv_options=POWER)
         if ranks == 3:  # 4, 4 and 2 layers, as FFTW would have them
             rank = np.minimum(np.arange(1000) // 400, 2)
             set_entry(many / "system/decomposeParDict", "numberOfSubdomains", "3")
@@ -74,7 +74,9 @@ def test_ranks_agree(tmp_path):
             utility(many, "decomposePar", "-force")
         else:
             divide(many, 2, (1, 1, 2))
-        run(many, ranks)
+        with (many / "system/controlDict").open("a") as control:
+            control.write(f"OptimisationSwitches {{ nodeMemory {shared}; }}\n")
+        assert re.search(rf"nodeMemory +{shared};", run(many, ranks))
         assert np.abs(velocity(many, "0.2", 10) - u).max() < 1e-13
 
 

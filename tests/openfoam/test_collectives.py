@@ -56,7 +56,8 @@ CALLS = {
     ),
     "fiberCoupling/sampling/beadExchange.H": (1, "the declaration of distribute"),
     "transform/slab.C": (2, "made for each mesh"),
-    "transform/slabTransform.C": (2, "every rank sweeps, with layers and rows or without"),
+    "transform/nodeMemory.C": (18, "made and met for transforms; ranks of a node agree whether they share"),
+    "transform/slabPlanes.C": (6, "every rank sweeps, with layers and rows or without"),
     "boxFoam/boxFlow.C": (6, "once a sweep of every rank"),
     "boxFoam/boxVelocity.C": (
         3,

@@ -207,6 +207,8 @@ Foam::scalar Foam::boxFlow::set(const vectorField& U)
 void Foam::boxFlow::set(const List<double>& modes)
 {
     modes_ = modes;
+    // nobody is at work on planes any more
+    transform_.toColumns();
 
     for (label y = 0; y < nRows(); ++y)
     {
@@ -312,7 +314,11 @@ void Foam::boxFlow::pressure(volScalarField& p)
     }
 
     // of zero mean: i k' p = N where the rate N has a part along k'
-    slabTransform transform(cells_, 1, cells_.n().x());
+    if (!pressure_)
+    {
+        pressure_.reset(new slabTransform(cells_, 1, cells_.n().x()));
+    }
+    slabTransform& transform = *pressure_;
     const scalarList& kx = k_.first(vector::X);
     List<double> modes(transform.columnSize());
 
