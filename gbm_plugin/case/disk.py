@@ -36,7 +36,7 @@ def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
     steps = span / scene.time_step
     beads = sum(f.count * f.beads for f in scene.families)
     count = writes(scene, start)
-    keep = control.integer("purgeWrite", 0, least=0)
+    keep = kept_folders(control)
     folder = _cell_bytes(scene, control) * math.prod(scene.cells or (0,)) + (STATE + CLOUD) * beads
     folders = folder * (min(count, keep) if keep else count)
     recording = (RECORD + 8 * len(scene.record)) * beads * math.ceil(steps / scene.record_interval)
@@ -48,6 +48,11 @@ def needed(scene: Scene, start: float | None = None) -> dict[str, int]:
         "total": folders + recording + tables,
     }
     return {name: int(size) for name, size in parts.items()}
+
+
+def kept_folders(control: Dictionary) -> int:
+    """Time folders of a run that are left, the newest; 0: all. controlDict, purgeWrite."""
+    return control.integer("purgeWrite", 0, least=0)
 
 
 def _cell_bytes(scene: Scene, control: Dictionary) -> float:

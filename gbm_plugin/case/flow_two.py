@@ -61,7 +61,7 @@ _FORCE = """eswaranPope
 _SOLUTION = """
 spectral
 {{
-    nSubCycles  {cycles};      // steps of the flow in a deltaT: 1 for h of 0.064, 2 for 0.032, 3 for 0.021, 4 for 0.016
+    nSubCycles  {cycles};      // steps of the flow in a deltaT: 1 for h of 0.064, 2 for 0.032, 4 for 0.021, 5 for 0.016
 }}
 """
 
@@ -125,18 +125,18 @@ FLOW_TWO = {
         1,
     ),
     "flow-II": _preset(
-        "Flow II: epsilon 0.34, Re_lambda 97, box 4.1, 192^3, from ../flow-II-start; hours by --flow spectral",
+        "Flow II: epsilon 0.34, Re_lambda 97, box 4.1, 192^3, from ../flow-II-start; --flow spectral: hours",
         _SMALL,
         192,
-        3,
+        4,
         "flow-II-start",
     ),
     "flow-II-wide-start": _preset("the same for flow-II-wide, at 96^3", _WIDE, 96, 1),
     "flow-II-wide": _preset(
-        "Flow II in the paper's box of 2 pi, 384^3, from ../flow-II-wide-start; a day by --flow spectral",
+        "Flow II in the paper's box of 2 pi, 384^3, from ../flow-II-wide-start; --flow spectral: a day",
         _WIDE,
         384,
-        4,
+        5,
         "flow-II-wide-start",
     ),
 }

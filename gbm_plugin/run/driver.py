@@ -9,12 +9,14 @@ from __future__ import annotations
 import logging
 import math
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
 
 from ..case.box_mesh import MOST, write_box_mesh
-from ..case.disk import Room
+from ..case.dictionary import Dictionary
+from ..case.disk import Room, kept_folders
 from ..case.initial import write_velocity
 from ..case.layout import STATE_FILE, results
 from ..case.mesh import has_mesh, read_box
@@ -108,6 +110,8 @@ class Run:
         self.scene, self.carrier, self.start = scene, carrier, start
         self._room = Room(scene)
         self._room.look(start.time)
+        self._keep = kept_folders(Dictionary.read(scene.case, "system/controlDict"))
+        self._written: list[Path] = []
         folders = [scene.case.parent / name for name in ("0.orig", "0")]
         self.template = next((f / "U" for f in folders if (f / "U").is_file()), None)
         if self.template is None:
@@ -185,6 +189,9 @@ class Run:
         write_velocity(self.template, folder / "U", self.carrier.on_cells(time))
         self.carrier.save(folder)
         self.journal.save(folder, self.step, time)
+        self._written.append(folder)
+        while self._keep and len(self._written) > self._keep:
+            shutil.rmtree(self._written.pop(0))  # as OpenFOAM: only what this run wrote
 
 
 def _name(time: float) -> str:

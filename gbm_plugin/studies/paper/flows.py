@@ -2,7 +2,8 @@
 
 A run is the folder of one (a case, or CASE/spectral), whose energies are in the table of its forcing and whose L,
 skewness, flatness and E(k) come from the velocity fields that it stored; or what `gbm study flow-one` keeps, NAME.csv
-with NAME_spectrum.csv beside it. It stands beside that flow of Table 1 whose ε is nearest.
+with NAME_spectrum.csv beside it (and a column `box` where that is not 2π). It stands beside that flow of Table 1 whose
+ε is nearest.
 """
 
 from __future__ import annotations
@@ -83,7 +84,8 @@ def _of_series(path: Path, settle: float) -> dict:
     late = series["time"] >= settle
     columns = {q: series[column][late] for q, (column, *_) in QUANTITIES.items()}
     spectrum = np.loadtxt(path.with_name(path.stem + "_spectrum.csv"), delimiter=",", skiprows=1)
-    return _summary(path.stem, cells, series["time"][late], columns, spectrum, int(late.sum()))
+    box = float(series["box"][0]) if "box" in series.columns else 2 * np.pi
+    return _summary(path.stem, cells, series["time"][late], columns, spectrum, int(late.sum()), box)
 
 
 def _of_folder(case: Path, settle: float, most: int) -> dict:
