@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import graphlib
+import re
 from pathlib import Path
 
 import pytest
@@ -83,3 +84,17 @@ def test_no_circle():
 def test_the_floors_hold_every_folder():
     folders = {name.split(".")[1] for name in KNOWN if name.count(".")}
     assert folders == set().union(*FLOORS)
+
+
+def test_every_source_is_in_one_unit():
+    """What no unit includes would be missed only where its name is looked up: as an unknown word of a dictionary."""
+    root = PACKAGE / "openfoam"
+    for part in (root, root / "boxFoam"):
+        units = [part / line for line in (part / "Make/files").read_text().split() if line.endswith(".C")]
+        included = [
+            part / name for unit in units for name in re.findall(r'#include "(.*\.C)"', unit.read_text())
+        ]
+        files = {file for file in part.rglob("*.C") if not {"lnInclude", "units"} & set(file.parts)}
+        if part == root:
+            files -= set((root / "boxFoam").rglob("*.C"))
+        assert sorted(included) == sorted(files)
