@@ -129,6 +129,13 @@ class Family:
         }
 
 
+def even_records(steps: np.ndarray) -> np.ndarray:
+    """Records at equal intervals, the usual one: a restart makes one more, of the step at which it began."""
+    usual = int(np.median(np.diff(steps))) if len(steps) > 1 else 1
+    phases, counts = np.unique(steps % max(usual, 1), return_counts=True)
+    return np.flatnonzero(steps % max(usual, 1) == phases[counts.argmax()])
+
+
 class FinishedRun:
     """A run whose recording is open: its label, its flow, families, and the times of the records in use (T,) [s].
 
@@ -168,7 +175,8 @@ class FinishedRun:
         if not len(times):
             raise ValueError(f"{self.case}: the recording is empty")
         self.since = (times[0] + times[-1]) / 2 if since is None else since
-        rows = np.flatnonzero(times >= self.since - 1e-9 * max(1.0, abs(self.since)))
+        self.even = even_records(self.recording.steps)
+        rows = self.even[times[self.even] >= self.since - 1e-9 * max(1.0, abs(self.since))]
         if len(rows) < 2:
             raise ValueError(
                 f"{self.case} has fewer than two records from t = {self.since:g} on: they are at {times[0]:g} "

@@ -74,14 +74,14 @@ def run(
 
 
 def _row(finished: FinishedRun, family: Family) -> tuple[dict, dict]:
-    first = np.arange(min(4, len(finished.recording.times)))
+    first = np.arange(min(4, len(finished.even)))
     some = finished.rows[:: max(1, len(finished.rows) // 20)]
     (ratio,) = finished.measure(family, lambda x: end_to_end_squared_ratio(x, family.radius), rows=some)
     if ratio.mean() < STRAIGHT or family.beads < 3:
         return {}, {}
-    flow, times = finished.flow, finished.recording.times
+    flow, times = finished.flow, finished.recording.times[finished.even]
     unit = flow.viscosity / flow.dissipation.value
-    (p,) = finished.measure(family, directions, rows=np.arange(len(times)))
+    (p,) = finished.measure(family, directions, rows=finished.even)
     spacing = float(np.diff(times).mean())
     whole = tumbling(p, spacing) if len(times) > 2 else np.zeros((0, family.count))
     late = whole[times[1:-1] >= finished.since]

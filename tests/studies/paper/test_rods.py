@@ -12,7 +12,7 @@ from gbm_plugin.cli import main
 from gbm_plugin.output.recording import FamilyRecord
 from gbm_plugin.studies.fields import fields_of
 from gbm_plugin.studies.paper import rods as study
-from gbm_plugin.studies.recorded import FinishedRun
+from gbm_plugin.studies.recorded import FinishedRun, even_records
 
 from known_runs import DISSIPATION, VISCOSITY, record_run, rods, unit
 
@@ -107,3 +107,9 @@ def test_random_rods_and_figure(with_field, tmp_path):
     assert found[0]["spheres"] == pytest.approx(1 / 6, rel=0.02)
     assert main(["study", "rods", str(case), "--save", str(tmp_path / "r")]) == 0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["r.csv", "r.json", "r.png"]
+
+
+def test_a_restart_leaves_no_uneven_interval():
+    steps = np.array([0, 9, 18, 20, 27, 36, 45])  # one more where a run went on at step 20
+    assert even_records(steps).tolist() == [0, 1, 2, 4, 5, 6]
+    assert even_records(np.array([7])).tolist() == [0]
