@@ -130,6 +130,9 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     add_case(sub)
     _add_json(sub)
     sub.add_argument(
+        "--quiet", action="store_true", help="without the averages, which a run prints at its end"
+    )
+    sub.add_argument(
         "--film", action="store_true", help="only a film: report/film/*.png, film.mp4 where ffmpeg is"
     )
     sub.add_argument("--frames", type=int, default=60, help="of the film (default: 60)")
@@ -224,7 +227,8 @@ def _report(arguments) -> dict | None:
         result["clouds"] = []
         result["not_drawn"].append(f"data of lagrangian/fibers: {error}")
     averages = summary(arguments.case)
-    print("\n".join(averages))
+    if not arguments.quiet:
+        print("\n".join(averages))
     folder = Path(arguments.case) / "report"
     print(f"written to {folder}: {' '.join(result['files'])}")
     for change in result["changes"]:

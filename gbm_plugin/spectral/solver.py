@@ -91,7 +91,7 @@ class SpectralSolver:
 
     def set_velocity(self, u: ArrayLike) -> None:
         """Set the velocity from node values (3, n, n, n): its mean and its solenoidal, resolved part."""
-        u = np.asarray(u)
+        u = np.ascontiguousarray(u)  # as the kernels are compiled for
         n = self.cells
         if u.shape != (3, n, n, n):
             raise ValueError(f"velocity must have shape (3, {n}, {n}, {n}), got {u.shape}")
