@@ -371,12 +371,15 @@ void Foam::functionObjects::fiberCoupling::receiveForces
     }
     t.forces += watch.lap();
 
-    // the power of a bead, in the words of what was sampled
+    // the power of a bead, in the words of what was sampled; and its loads by
+    // the mass of a cell, one for all: sampler refuses to spread on others
+    // than a uniform box
     scalar exchange = 0;
+    const scalar perCellMass = 1/cellMass_;
     for (label bead = 0; bead < beads; ++bead)
     {
         const scalar* u = sampled.cdata() + n*bead;
-        const scalar* load = loads.cdata() + 6*bead;
+        scalar* load = loads.begin() + 6*bead;
         const vector rotation
         (
             wanted_ == ROTATION
@@ -386,16 +389,15 @@ void Foam::functionObjects::fiberCoupling::receiveForces
         exchange +=
             (vector(load[0], load[1], load[2]) & vector(u[0], u[1], u[2]))
           + (vector(load[3], load[4], load[5]) & rotation);
+        for (label i = 0; i < 6; ++i)
+        {
+            load[i] *= perCellMass;
+        }
     }
     reduce(exchange, sumOp<scalar>());
 
     *feedback::exchange() = exchange/(nCells_*cellMass_);
 
-    // a uniform box: sampler refuses to spread on others
-    for (scalar& load : loads)
-    {
-        load /= cellMass_;
-    }
     const scalarList own(beads_->distribute(std::move(loads), 6));
     sampler_->spread(own, beads_(), feedback_->next());
     feedback_->renewed(step_);

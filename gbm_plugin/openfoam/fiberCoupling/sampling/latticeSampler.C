@@ -100,6 +100,38 @@ void sampleWith
 }
 
 
+//- Numbers of a vector unit, anywhere in memory: of short loops the compiler
+//  would make single ones
+typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+
+
+//- target (+)= f a + g b
+template<int M, bool add>
+INLINE void combine
+(
+    double* target,
+    const double f,
+    const double* a,
+    const double g,
+    const double* b
+)
+{
+    #define COMBINE(type, i)                                                   \
+    {                                                                          \
+        type& t = reinterpret_cast<type&>(target[i]);                          \
+        const type sum =                                                       \
+            f*reinterpret_cast<const type&>(a[i])                              \
+          + g*reinterpret_cast<const type&>(b[i]);                             \
+        t = add ? t + sum : sum;                                               \
+    }
+    static_assert(M % 2 == 0, "pairs");
+    for (int i = 0; i + 4 <= M; i += 4) COMBINE(four, i)
+    if (M % 4) COMBINE(pair, M - 2)
+    #undef COMBINE
+}
+
+
 //- What 'spread' of sampler gives, in the order of the points
 template<class Interpolant>
 INLINE void spreadAll
@@ -115,18 +147,31 @@ INLINE void spreadAll
 {
     constexpr int N = Interpolant::reach;
     constexpr int below = Interpolant::below;
+    constexpr int outer = Interpolant::outer;
+    const auto weighted = [](const int m)
+    {
+        return outer <= m && m < N - outer;
+    };
     const vector perCell(cells.box().perCell());
     const Vector<label> stride(cells.strides());
     const label* slots = cells.slots().cdata();
     const unsigned char* runs = cells.runs().cdata();
+    const stencil target{slots, runs, 0, stride, own, neighbours, nCells};
 
-    forAll(beads.points(), bead)
+    const UList<point>& points = beads.points();
+    vector next;
+    label nextSlot = points.size() ? cells.around(points[0], next) : 0;
+
+    forAll(points, bead)
     {
-        const scalar* load = loads + 6*beads.placeOf(bead);
-        vector x;
+        const vector x(next);
         const label slot =
-            cells.around(beads.points()[bead], x)
-          - below*(stride.x() + stride.y() + stride.z());
+            nextSlot - below*(stride.x() + stride.y() + stride.z());
+        if (bead + 1 < points.size())
+        {
+            nextSlot = cells.around(points[bead + 1], next);
+            target.template fetch<N>(nextSlot, below);
+        }
 
         double w[3][N], s[3][N];
         for (direction d = 0; d < 3; ++d)
@@ -137,45 +182,58 @@ INLINE void spreadAll
                 s[d][m] *= perCell[d];
             }
         }
-        const vector force(load[0], load[1], load[2]);
+        const scalar* load = loads + 6*beads.placeOf(bead);
         const vector couple(0.5*load[3], 0.5*load[4], 0.5*load[5]);
 
-        for (int k = 0; k < N; ++k)
-        for (int j = 0; j < N; ++j)
+        // along x: the force with the couple x slope there, and what the
+        // slopes in y and z multiply, couple x e_y and couple x e_z
+        double p[3*N], q[3*N], r[3*N];
+        for (int m = 0; m < N; ++m)
         {
-            // couple x slopes, by its part of the weights and slopes in x
-            const double yz = w[1][j]*w[2][k];
-            const vector slopes(0, s[1][j]*w[2][k], w[1][j]*s[2][k]);
-            if (yz == 0 && slopes.y() == 0 && slopes.z() == 0)
-            {
-                continue;
-            }
-            const vector byValue(yz*force + (couple ^ slopes));
-            const vector bySlope(0, yz*couple.z(), -yz*couple.y());
-            const label first = slot + stride.y()*j + stride.z()*k;
-            const label* values = slots + first;
+            const double v = w[0][m], d = s[0][m];
+            p[3*m] = v*load[0];
+            p[3*m + 1] = v*load[1] + d*couple.z();
+            p[3*m + 2] = v*load[2] - d*couple.y();
+            q[3*m] = -v*couple.z();
+            q[3*m + 1] = 0;
+            q[3*m + 2] = v*couple.x();
+            r[3*m] = v*couple.y();
+            r[3*m + 1] = -v*couple.x();
+            r[3*m + 2] = 0;
+        }
 
-            double row[3*N];
-            for (int i = 0; i < N; ++i)
-            for (direction c = 0; c < 3; ++c)
+        for (int k = 0; k < N; ++k)
+        {
+            double a[3*N], b[3*N];
+            combine<3*N, false>(a, w[2][k], p, s[2][k], r);
+            combine<3*N, false>(b, w[2][k], q, 0, q);
+
+            for (int j = 0; j < N; ++j)
             {
-                row[3*i + c] = w[0][i]*byValue[c] + s[0][i]*bySlope[c];
-            }
-            if (runs[first] >= N)
-            {
-                double* target = own[values[0]].v_;
-                for (int i = 0; i < 3*N; ++i)
+                if (!weighted(j) && !weighted(k))
                 {
-                    target[i] += row[i];
+                    continue;
                 }
-                continue;
-            }
-            for (int i = 0; i < N; ++i)
-            {
-                const label value = values[i];
-                vector& target =
-                    value < nCells ? own[value] : neighbours[value - nCells];
-                target += vector(row[3*i], row[3*i + 1], row[3*i + 2]);
+                const label first = slot + stride.y()*j + stride.z()*k;
+
+                if (runs[first] >= N)
+                {
+                    combine<3*N, true>
+                    (
+                        own[slots[first]].v_, w[1][j], a, s[1][j], b
+                    );
+                    continue;
+                }
+                for (int m = 0; m < N; ++m)
+                {
+                    const label value = slots[first + m];
+                    vector& cell =
+                        value < nCells ? own[value] : neighbours[value - nCells];
+                    for (int c = 0; c < 3; ++c)
+                    {
+                        cell[c] += w[1][j]*a[3*m + c] + s[1][j]*b[3*m + c];
+                    }
+                }
             }
         }
     }
