@@ -129,6 +129,9 @@ class Family:
         }
 
 
+TURNING = 1.0  # Kolmogorov times between records that tumbling can be told from
+
+
 def even_records(steps: np.ndarray) -> np.ndarray:
     """Records at equal intervals, the usual one: a restart makes one more, of the step at which it began."""
     usual = int(np.median(np.diff(steps))) if len(steps) > 1 else 1
@@ -189,6 +192,11 @@ class FinishedRun:
     def spacing(self) -> float:
         """Between the records in use [s]."""
         return float(np.diff(self.times).mean())
+
+    @property
+    def turns(self) -> bool:
+        """Whether the records in use follow a rod that turns with the smallest eddies."""
+        return self.spacing <= TURNING * self.flow.kolmogorov_time
 
     def _flow(self) -> Flow:
         table, meta = self.table, self.recording.metadata

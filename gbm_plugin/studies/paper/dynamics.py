@@ -80,7 +80,8 @@ def _moved(finished: FinishedRun, family: Family) -> tuple[dict, dict]:
         "time_of_curvature_over_tau": integral_scale(bending) * finished.spacing / tau,
     }
     p = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    row |= _averaged("tumbling", (tumbling(p, finished.spacing) if len(p) > 2 else p[:1, :, 0]) * tau**2)
+    if finished.turns and len(p) > 2:
+        row |= _averaged("tumbling", tumbling(p, finished.spacing) * tau**2)
     row |= _averaged("self_contact", near) | _averaged("folded", folded)
     row |= _rate(
         "buckling", np.linalg.norm(vectors, axis=-1) / family.contour < STRAIGHT, finished.spacing / tau

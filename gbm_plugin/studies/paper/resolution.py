@@ -106,7 +106,7 @@ def _values(r: FinishedRun, family: Family) -> dict[str, NDArray]:
         (bent,) = r.measure(family, lambda x: mean_curvature(x, family.radius))
         found["curvature"] = bent * family.contour
         spacing = np.diff(r.times)
-        if ratio.mean() > STRAIGHT and np.ptp(spacing) < 1e-3 * spacing.mean():
+        if r.turns and ratio.mean() > STRAIGHT and np.ptp(spacing) < 1e-3 * spacing.mean():
             (p,) = r.measure(family, directions)
             found["tumbling"] = tumbling(p, float(spacing.mean())) * r.flow.viscosity / _dissipation(r)
     return found

@@ -31,7 +31,7 @@ from ...statistics.orientation import (
     tumbling,
 )
 from ..fields import fields_of
-from ..recorded import Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
+from ..recorded import TURNING, Family, FinishedRun, Since, add_run_arguments, finished_runs, flow_lines
 from ..study import compact, option
 
 SETTLED, SPHERES = 0.09, 1 / 6
@@ -59,6 +59,12 @@ def run(
     """
     found, flows, kinematics, curves = [], [], [], []
     for finished in finished_runs(cases, since, records or 1 << 40, families):
+        if not finished.turns:
+            apart = finished.spacing / finished.flow.kolmogorov_time
+            raise ValueError(
+                f"{finished.case}: its records are {apart:.3g} Kolmogorov times apart, and tumbling needs "
+                f"them at most {TURNING:g} apart: a smaller recordInterval"
+            )
         flows.append(finished.summary())
         aligned = _aligned(finished, states, kinematics)
         for family in finished.followed():

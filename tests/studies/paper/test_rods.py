@@ -113,3 +113,11 @@ def test_a_restart_leaves_no_uneven_interval():
     steps = np.array([0, 9, 18, 20, 27, 36, 45])  # one more where a run went on at step 20
     assert even_records(steps).tolist() == [0, 1, 2, 4, 5, 6]
     assert even_records(np.array([7])).tolist() == [0]
+
+
+def test_records_that_are_too_far_apart_are_refused(tmp_path):
+    tau = np.sqrt(UNIT)
+    family = (FamilyRecord("random", 20, 10, 0.01, 1.0), lambda t: turning(False)[1](t)[:20])
+    record_run(tmp_path, [family], np.arange(5) * 1.3 * tau)
+    with pytest.raises(ValueError, match=r"its records are 1\.3 Kolmogorov times apart"):
+        study.run([tmp_path], since=0.0)
