@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..errors import CaseError, InstallationError
 from .edit import set_entries
+from .flow_one import FLOW_ONE
 from .flow_two import FLOW_TWO
 from .preset import Preset
 
@@ -22,24 +23,6 @@ _HEAD = """FoamFile
     object      {name};
 }}
 
-"""
-
-
-_FLOW_ONE_FIBERS = """rho             1;
-
-mobility        freeDrain;
-integrator      auto;
-tolerance       1e-4;
-interpolation   cubic;
-recordInterval  20;
-
-families    // d = 0.1 (3.5 eta), K^b from flexible to stiff, as in section 4 of the paper
-{
-    K1e-6   { count 100; beads 20; length 2; bendingStiffness 1e-6; seed 1; }
-    K1e-5   { count 100; beads 20; length 2; bendingStiffness 1e-5; seed 2; }
-    K1e-4   { count 100; beads 20; length 2; bendingStiffness 1e-4; seed 3; }
-    K1e-3   { count 100; beads 20; length 2; bendingStiffness 1e-3; seed 4; }
-}
 """
 
 PRESETS = {
@@ -62,25 +45,7 @@ PRESETS = {
             "system/controlDict": {"application": "pimpleFoam", "deltaT": 0.04, "writeInterval": 75},
         },
     ),
-    "flow-I": Preset(
-        "Flow I of the paper: 128^3, Eswaran-Pope forcing, epsilon 0.0015, Re_lambda 52; hours",
-        {
-            "system/blockMeshDict": {"n": 128},
-            "constant/transportProperties": {"nu": 1e-3},
-            "system/controlDict": {
-                "deltaT": 0.01,
-                "endTime": 500,
-                "writeInterval": 2000,
-            },
-            "system/initialFieldDict": {"kineticEnergy": 0.025},
-        },
-        {
-            "constant/fvOptions": "eswaranPope\n{\n    type        eswaranPope;\n    variance    5.53e-7;    // of an "
-            "amplitude [m2/s4]\n    timeScale   7.65;       // [s]\n    cutoff      3.4641;     // waves per box\n"
-            "    seed        1;\n}\n",
-            "constant/fiberProperties": _FLOW_ONE_FIBERS,
-        },
-    ),
+    **FLOW_ONE,
     **FLOW_TWO,
     "taylor-green": Preset(
         "the decaying three-dimensional Taylor-Green vortex, without forcing",

@@ -45,8 +45,8 @@ def test_a_folder_that_is_there_and_a_preset_that_is_not(tmp_path, capsys):
         new_case(tmp_path)
     assert main(["new", str(tmp_path / "c"), "--preset", "flow-2"]) == 1
     assert (
-        "allowed: default quick pimpleFoam flow-I flow-II-start flow-II flow-II-wide-start flow-II-wide taylor-green"
-        in capsys.readouterr().err
+        "allowed: default quick pimpleFoam flow-I flow-I-families flow-II-start flow-II flow-II-wide-start "
+        "flow-II-wide taylor-green" in capsys.readouterr().err
     )
     assert not (tmp_path / "c").exists()
 
