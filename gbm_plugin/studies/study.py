@@ -20,6 +20,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -43,29 +44,26 @@ class Study:
 
     group: str
     path: Path
+    title: str  # the first line of its docstring
 
     @property
     def name(self) -> str:
         return self.path.stem.replace("_", "-")
 
-    @property
-    def title(self) -> str:
-        """The first line of the module's docstring."""
-        text = ast.get_docstring(ast.parse(self.path.read_text()))
-        return (text or "").partition("\n")[0]
-
     def load(self) -> ModuleType:
         return import_module(f"{__package__}.{self.group}.{self.path.stem}")
 
 
+@cache
 def find_studies() -> dict[str, Study]:
     """All studies by name, in the order of the groups."""
     found = {}
     for group in GROUPS:
         for path in sorted((Path(__file__).parent / group).glob("*.py")):
-            defined = {n.name for n in ast.parse(path.read_text()).body if isinstance(n, ast.FunctionDef)}
-            if defined >= CONTRACT:
-                found[path.stem.replace("_", "-")] = Study(group, path)
+            module = ast.parse(path.read_text())
+            if {n.name for n in module.body if isinstance(n, ast.FunctionDef)} >= CONTRACT:
+                title = (ast.get_docstring(module) or "").partition("\n")[0]
+                found[path.stem.replace("_", "-")] = Study(group, path, title)
     return found
 
 
