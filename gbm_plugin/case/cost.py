@@ -50,8 +50,9 @@ CELL, CELL_OTHER, BEAD_MEMORY = 900, 1500, 4000  # bytes, at their highest: boxF
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds of a run from startTime on an idle machine, on one rank: the parts, of which `fibers` is what the flow
-    does not hide; None where nothing was measured. memory [bytes] of solver and daemons."""
+    """Seconds of a run from startTime on an idle machine, on one rank: the parts, of which `fibers` and `coupling` are
+    what the flow does not hide; None where nothing was measured. solver: processor time of the solver, which moves
+    no fibers but samples for them, hidden or not. memory [bytes] of solver and daemons."""
 
     start: float
     flow: float | None
@@ -59,6 +60,7 @@ class Cost:
     coupling: float
     writing: float
     total: float | None
+    solver: float | None
     memory: float
 
 
@@ -70,18 +72,24 @@ def cost(scene: Scene, slower: float | None = None) -> Cost:
     step = _flow_step(scene, cells)
     cores = len(os.sched_getaffinity(0))
     daemon = DAEMON + TAKEN * beads + sum(map(_moved, scene.families, [scene] * len(scene.families)))
-    hidden = min(daemon, step or 0.0) if cores > 1 else 0.0
+    sampling = EXCHANGE + beads * (BEAD + _sampled(scene, cells))
+    # a thread of boxFoam samples while the next step is computed, and the daemon goes on when it has
+    beside = scene.application == "boxFoam" and not scene.coupling.feedback and scene.interpolation in SAMPLE
+    room = step or 0.0 if cores > 1 else 0.0
+    sampled = min(sampling, room) if beside else 0.0
+    hidden = min(daemon, room - sampled)
     disk = needed(scene)
     parts = {
         "start": slower * (START + PREPARED * cells),
         "flow": None if step is None else slower * steps * step,
         "fibers": slower * steps * (daemon - hidden),
-        "coupling": slower * steps * (EXCHANGE + beads * (BEAD + _sampled(scene, cells))),
+        "coupling": slower * steps * (sampling - sampled),
         "writing": writes(scene) * disk["time_folder"] / DISK + RECORD * steps / scene.record_interval,
     }
     total = None if step is None else sum(value for value in parts.values() if value is not None)
     each = CELL if scene.application == "boxFoam" else CELL_OTHER
-    return Cost(**parts, total=total, memory=PROGRAMS + each * cells + BEAD_MEMORY * beads)
+    solver = None if step is None else slower * steps * (step + sampling)
+    return Cost(**parts, total=total, solver=solver, memory=PROGRAMS + each * cells + BEAD_MEMORY * beads)
 
 
 def machine() -> float:

@@ -18,6 +18,7 @@ WIDTH = 80  # columns of a screen
 NAMES, WHY = 11, 24  # of them for what a line is about, and for why
 FAMILIES = 4  # so many have a line
 PARTS = ("start", "flow", "fibers", "coupling", "writing")  # of the time
+HIDDEN = {"fibers": "the fibers", "coupling": "the coupling"}
 
 
 def figures(scene: Scene) -> dict:
@@ -141,7 +142,8 @@ def _takes(cost: dict, disk: dict) -> list[str]:
     time = "a time that no measurement tells"
     if cost["total"] is not None:
         parts = ", ".join(f"{name} {_seconds(cost[name])}" for name in PARTS if cost[name])
-        hidden = "" if cost["fibers"] else "; the flow hides the fibers"
+        names = [what for name, what in HIDDEN.items() if not cost[name]]
+        hidden = f"; the flow hides {' and '.join(names)}" if names else ""
         time = f"about {_seconds(cost['total'])} on this machine, idle: {parts}{hidden}"
     room = f"disk {readable(disk['total'])}, {readable(disk['free'])} are free"
     text = f"{time}; memory {readable(cost['memory'])}; {room}"

@@ -174,8 +174,10 @@ def test_the_estimate_follows_the_work(path, monkeypatch):
     scene = read_scene(path)
     scene = replace(scene, application="boxFoam", write_interval=np.inf)
     once, twice = (cost(replace(scene, end_time=t), slower=1.0) for t in (4.0, 8.0))
-    for part in ("flow", "coupling"):
+    for part in ("flow", "solver"):
         assert getattr(twice, part) == pytest.approx(2 * getattr(once, part))
+    mesh = replace(scene, application="pimpleFoam", end_time=4.0)  # which waits for its coupling
+    assert once.coupling == 0 and cost(mesh, slower=1.0).coupling == pytest.approx(once.solver - once.flow)
     assert twice.start == once.start
     assert cost(replace(scene, end_time=4.0), slower=3.0).flow == pytest.approx(3 * once.flow)
     large = cost(replace(scene, cells=(256, 256, 256), end_time=4.0), slower=1.0)

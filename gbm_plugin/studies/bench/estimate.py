@@ -63,7 +63,7 @@ def _measured(case: Path, slower: float) -> dict[str, float]:
     spent = [float(x) for x in re.findall(r"^ExecutionTime = ([\d.]+) s", log, re.MULTILINE)]
     solver = (spent[-1] - spent[0]) * len(spent) / (len(spent) - 1)  # without the start of the program
     return {
-        "solver_estimated": estimate.flow + estimate.coupling,
+        "solver_estimated": estimate.solver,
         "solver": solver,
         "wall_estimated": estimate.total,
         "wall": wall,

@@ -8,8 +8,12 @@ daemon and two numbers of fibers; the model then predicts the other runs:
     step     = flow + coupling + max(0, daemon - flow)
 
 with B beads, R ranks, D daemons, and flow, the step without fibers' cost, as measured with few fibers on R ranks. A
-daemon is a bottleneck from B = D (flow - fixed)/daemon on. Where processes outnumber cores they share these, which the
-model does not know.
+daemon is a bottleneck from B = D (flow - fixed)/daemon on. On one rank boxFoam computes its step while a thread does
+what the coupling is, and a daemon goes on when it has its sample:
+
+    step     = max(flow, coupling + daemon)
+
+Where processes outnumber cores they share these, which the model does not know.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ...case.scene import read_scene
 from ..study import option
 from . import coupling
 from .coupling import PARTS
@@ -41,13 +46,16 @@ def constants(few: dict, many: dict) -> dict[str, tuple[float, float]]:
     return result
 
 
-def predict(c: dict, flow: float, beads: int, ranks: int, daemons: int) -> dict[str, float]:
-    """Seconds of the coupling, of a daemon, and of the whole step."""
+def predict(
+    c: dict, flow: float, beads: int, ranks: int, daemons: int, beside: bool = False
+) -> dict[str, float]:
+    """Seconds of the coupling, of a daemon, and of the whole step; beside: the solver does not wait for it."""
     served = min(ranks, daemons)
     coupling = sum(c[name][0] for name in ("location", "sampling", "sending"))
     coupling += beads * ((c["location"][1] + c["sending"][1]) / served + c["sampling"][1] / ranks)
     daemon = c["daemon"][0] + beads * c["daemon"][1] / daemons
-    return {"coupling": coupling, "daemon": daemon, "step": flow + coupling + max(0.0, daemon - flow)}
+    step = max(flow, coupling + daemon) if beside else flow + coupling + max(0.0, daemon - flow)
+    return {"coupling": coupling, "daemon": daemon, "step": step}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,6 +70,7 @@ def run(case: Path | str, cells: int = 64, turns: int = 2) -> dict:
     def turn(fibers: int, ranks: int, daemons: int) -> dict:
         return measure(Path(case), cells, fibers, ranks, daemons, turns)
 
+    threaded = read_scene(case).application == "boxFoam"
     few = {ranks: turn(FEW, ranks, 1) for ranks in (1, 2, 4)}
     many = {(r, d): turn(MANY, r, d) for r, d in ((1, 1), (1, 2), (2, 1), (2, 2), (4, 1), (4, 2), (4, 4))}
     c = constants(few[1], many[1, 1])
@@ -69,13 +78,16 @@ def run(case: Path | str, cells: int = 64, turns: int = 2) -> dict:
     for r in [*few.values(), *many.values()]:
         base = few[r["ranks"]]
         flow = base["step"] - base["held"]
-        predicted = predict(c, flow, r["fibers"] * r["beads"], r["ranks"], r["daemons"])
+        beside = threaded and r["ranks"] == 1
+        predicted = predict(c, flow, r["fibers"] * r["beads"], r["ranks"], r["daemons"], beside)
         coupling_time = sum(r[name] for name in PARTS if name != "wait")
         found.append(r | {"coupling": coupling_time} | {f"{k}_model": v for k, v in predicted.items()})
     limits = {}
     for ranks, r in few.items():
         flow = r["step"] - r["held"]
-        limits[ranks] = {"flow": flow, "fibers": (flow - c["daemon"][0]) / c["daemon"][1] / BEADS}
+        busy = list(c) if threaded and ranks == 1 else ["daemon"]
+        fixed, each = (sum(c[name][i] for name in busy) for i in (0, 1))
+        limits[ranks] = {"flow": flow, "fibers": max(0.0, flow - fixed) / each / BEADS}
     return {"constants": c, "rows": found, "limits": limits}
 
 
