@@ -29,6 +29,16 @@ def test_what_a_mesh_cannot_hold_is_left_out():
     np.testing.assert_allclose(left[2], x[2], atol=1e-13)
 
 
+def test_a_run_that_would_take_too_long_is_judged_by_coarser_ones():
+    """Errors n^-2 and times n^4: 16 times as long on twice the cells."""
+    coarser = [
+        {"cells": n, "velocity_error": 9 / n**2, "processor_seconds": 1e-6 * n**4} for n in (30, 40, 50)
+    ]
+    assert speed.too_long(coarser, 100, 99) and not speed.too_long(coarser, 100, 101)
+    assert not speed.too_long(coarser[:1], 100, 1)
+    assert speed.on_their_line(coarser, 100) == pytest.approx(9e-4)
+
+
 def test_cost_at_equal_error():
     """boxFoam: cost error^(-1/2); at the error 1e-2 it is 10."""
     box = [{"solver": "boxFoam", "velocity_error": e, "processor_seconds": e**-0.5} for e in (1e-1, 1e-3)]
