@@ -239,6 +239,7 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
         solver = start_solver(case)
         try:
             channel, first, _ = listener.greet(lambda: solver.poll() is not None)
+            channel.feedback = scene.coupling.feedback
             misbehave(channel, first, beads)
             assert solver.wait() == 1
             channel.close()
@@ -250,20 +251,27 @@ def fake_daemon(case: Path, misbehave: Callable) -> str:
     return text
 
 
-def welcome() -> Message:
-    return Message(Kind.WELCOME, 0, 0.0, encode_welcome("rotation", False, FAMILIES))
+def welcome(feedback: bool = False) -> Message:
+    return Message(Kind.WELCOME, 0, 0.0, encode_welcome("rotation", feedback, FAMILIES))
 
 
 def greet(channel, first: Message, beads: int) -> None:
     """WELCOME, and step 0 as it should be."""
-    channel.send(welcome())
+    channel.send(welcome(channel.feedback))
     channel.send(positions(0, beads))
     channel.receive(1 << 20)
+    if channel.feedback:
+        channel.send(forces(0, beads))
 
 
 def positions(step: int, beads: int, value: float = 1.0, **changes) -> Message:
     values = {"step": step, "time": 0.02 * step, "payload": encode_array(np.full((beads, 3), value))}
     return Message(Kind.POSITIONS, **{**values, **changes})
+
+
+def forces(step: int, beads: int, value: float = 0.0, **changes) -> Message:
+    values = {"step": step, "time": 0.02 * step, "payload": encode_array(np.full((2, beads, 3), value))}
+    return Message(Kind.FORCES, **{**values, **changes})
 
 
 def header(message: Message, **fields) -> bytes:

@@ -26,6 +26,7 @@ from fakes import (
     Run,
     children,
     fake_daemon,
+    forces,
     greet,
     header,
     is_solver,
@@ -51,19 +52,20 @@ def original(tmp_path_factory):
 
 @pytest.fixture
 def copy(original, tmp_path):
-    """A case of one's own, with another transport and timeout."""
+    """A case of one's own, with another transport and timeout, and perhaps fibers that act on the flow."""
 
-    def make(transport: str = "socket", timeout: float = PATIENT, name: str = "case"):
+    def make(transport: str = "socket", timeout: float = PATIENT, name: str = "case", feedback: bool = False):
         case = shutil.copytree(original, tmp_path / name)
-        set_coupling(case, transport, timeout)
+        set_coupling(case, transport, timeout, feedback)
         return case
 
     return make
 
 
-def set_coupling(case, transport: str, timeout: float) -> None:
+def set_coupling(case, transport: str, timeout: float, feedback: bool = False) -> None:
     properties = case / "constant/fiberProperties"
-    words = f"coupling {{ transport {transport}; timeout {timeout:g}; }}"
+    more = "feedback yes; ownDisturbance kept;" if feedback else ""
+    words = f"coupling {{ transport {transport}; timeout {timeout:g}; {more} }}"
     text, found = re.subn(r"coupling \{.*?\}", words, properties.read_text())
     assert found == 1
     properties.write_text(text)
@@ -182,7 +184,8 @@ SOLVER_FAULTS = {
 }
 
 
-# on the other transports those that a transport could hide; a file is a whole message or a short one
+# on the other transports, and there with forces between sample and positions, those that a transport could hide; a
+# file is a whole message or a short one
 SOLVER_FAULTS_ELSEWHERE = ("truncated", "duplicated", "out of order", "version", "NaN")
 IN_FILES = {
     "truncated": "short message",
@@ -198,7 +201,7 @@ SOLVER_FAULTS_IN_FILES = {"two in one": (lambda s: s.raw(2 * s.sample(4).encode(
     + [("file", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, *SOLVER_FAULTS_IN_FILES)],
 )
 def test_daemon_with_a_solver_that_is(transport, fault, copy):
-    prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT)
+    prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT, feedback=transport != "socket")
     misbehave, expected = (SOLVER_FAULTS | SOLVER_FAULTS_IN_FILES)[fault]
     if transport == "file":
         expected = IN_FILES.get(fault, expected)
@@ -398,6 +401,8 @@ def _talkative(channel, first, beads):
             pass
         if message.kind is Kind.END:
             break
+        if channel.feedback:
+            channel.send(forces(step, beads))
         step += 1
     goodbye = Message(Kind.GOODBYE, message.step, message.time)
     if hasattr(channel, "_socket"):
@@ -426,7 +431,7 @@ DAEMON_FAULTS_ELSEWHERE = (
     + [(transport, fault) for transport in ("tcp", "file") for fault in DAEMON_FAULTS_ELSEWHERE],
 )
 def test_solver_with_a_daemon_that_is(transport, fault, copy):
-    prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT)
+    prepared = copy(transport, IMPATIENT if "silence" in fault else PATIENT, feedback=transport != "socket")
     misbehave, expected = DAEMON_FAULTS[fault]
     if transport == "file" and fault == "truncated":
         expected = "message of the wrong length in"

@@ -8,10 +8,10 @@ import pytest
 
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.coupling.listen import listen
-from gbm_plugin.coupling.message import PROVISIONAL, Kind, Message, encode_array, encode_welcome
+from gbm_plugin.coupling.message import PROVISIONAL, Kind, Message
 
 from conftest import make_case, solver_log, start_solver
-from fakes import FAMILIES, PATIENCE, FakeSolver, fake_daemon, header, positions, welcome
+from fakes import PATIENCE, FakeSolver, fake_daemon, forces, header, positions, welcome
 
 pytestmark = pytest.mark.openfoam
 
@@ -26,21 +26,19 @@ def prepared(tmp_path_factory):
     return path
 
 
-def forces(step: int = 0, value: float = 0.0, **changes) -> Message:
-    values = {"step": step, "time": 0.02 * step, "payload": encode_array(np.full((2, BEADS, 3), value))}
-    return Message(Kind.FORCES, **{**values, **changes})
-
-
 FAULTS = {
-    "short": (forces(payload=bytes(48 * 71)).encode(), f"FORCES has {48 * 71} bytes, expected {48 * 72}"),
-    "oversize": (header(forces(), size=1 << 50), f"announces {1 << 50} bytes"),
-    "of another step": (forces(1).encode(), "FORCES is of step 1, expected step 0"),
-    "of another time": (forces(time=0.01).encode(), "FORCES are of time 0.01, expected time 0"),
-    "NaN": (forces(value=np.nan).encode(), "FORCES are not finite at bead 0"),
-    "flags": (header(forces(), flags=4), "FORCES has unknown flags: 4"),
-    "of no kind": (header(forces(), kind=99), "received message of unknown type 99"),
-    "of another version": (header(forces(), version=3), "version 3"),
-    "of a stranger": (header(forces(), magic=b"HTTP"), "what answers is not a gbm daemon"),
+    "short": (
+        forces(0, BEADS, payload=bytes(48 * 71)).encode(),
+        f"FORCES has {48 * 71} bytes, expected {48 * 72}",
+    ),
+    "oversize": (header(forces(0, BEADS), size=1 << 50), f"announces {1 << 50} bytes"),
+    "of another step": (forces(1, BEADS).encode(), "FORCES is of step 1, expected step 0"),
+    "of another time": (forces(0, BEADS, time=0.01).encode(), "FORCES are of time 0.01, expected time 0"),
+    "NaN": (forces(0, BEADS, np.nan).encode(), "FORCES are not finite at bead 0"),
+    "flags": (header(forces(0, BEADS), flags=4), "FORCES has unknown flags: 4"),
+    "of no kind": (header(forces(0, BEADS), kind=99), "received message of unknown type 99"),
+    "of another version": (header(forces(0, BEADS), version=3), "version 3"),
+    "of a stranger": (header(forces(0, BEADS), magic=b"HTTP"), "what answers is not a gbm daemon"),
     "positions instead": (positions(1, BEADS).encode(), "expected FORCES, received POSITIONS"),
 }
 
@@ -50,13 +48,33 @@ def test_pimplefoam_with_forces_that_are(fault, prepared):
     data, expected = FAULTS[fault]
 
     def misbehave(channel, first, beads):
-        channel.send(Message(Kind.WELCOME, 0, 0.0, encode_welcome("rotation", True, FAMILIES)))
+        channel.send(welcome(feedback=True))
         channel.send(positions(0, beads))
         channel.receive(1 << 20)
         channel._write(data)
 
     line = fake_daemon(prepared, misbehave)
     assert expected in line and f"its log: {prepared}/log.gbmDaemon" in line
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_forces_with_bytes_at_random(seed, prepared):
+    """Whatever they are, the solver ends in one line: by what is wrong with them, with the flow, or with the peer."""
+    rng = np.random.default_rng(seed)
+
+    def misbehave(channel, first, beads):
+        channel.send(welcome(feedback=True))
+        channel.send(positions(0, beads))
+        channel.receive(1 << 20)
+        data = bytearray(forces(0, beads, 0.1).encode())
+        some = 40 if seed % 2 else len(data)  # the header alone, or all
+        for place in rng.integers(some, size=1 + rng.integers(4)):
+            data[place] = rng.integers(256)
+        channel._write(bytes(data[: len(data) - (seed % 3 == 0) * rng.integers(len(data))]))
+        channel._socket.close()
+
+    line = fake_daemon(prepared, misbehave)
+    assert "\n" not in line and len(line) < 400
 
 
 def said(case, words):
