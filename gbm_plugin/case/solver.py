@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from .dictionary import Dictionary
@@ -31,6 +32,22 @@ def second_difference(case: Path) -> tuple[float, ...]:
     """c_m of the second difference sum c_m (u(+m) - 2u + u(-m))/h^2 of the case's solver on equal cells."""
     solver = Dictionary.read(case, "system/controlDict").word("application")
     return SECOND[_differences(case) if solver == "boxFoam" else "central2"]
+
+
+def face_values(case: Path) -> tuple[str, str]:
+    """cubic, or linear as which all others count: what a solver of finite volumes has at faces for grad(p) and for the
+    fluxes whose divergence its pressure removes."""
+    schemes = Dictionary.read(case, "system/fvSchemes")
+    gradient = _scheme(schemes.sub("gradSchemes", {}), "grad(p)")
+    fluxes = _scheme(schemes.sub("interpolationSchemes", {}), "flux(HbyA)")
+    return tuple("cubic" if "cubic" in word.lower() else "linear" for word in (gradient, fluxes))
+
+
+def _scheme(group: Dictionary, name: str) -> str:
+    """What OpenFOAM finds for a name, or a pattern of it, or the default."""
+    patterns = [n for n in reversed(group.names) if n != name and re.fullmatch(n, name)]
+    found = next((n for n in (name, *patterns, "default") if n in group), None)
+    return str(group.raw(found)) if found else ""
 
 
 def _differences(case: Path) -> str:

@@ -15,6 +15,7 @@ from ..case.feedback import cell_size, removes_own
 from ..case.layout import STATE_FILE, fiber_state
 from ..case.scene import Family, Scene
 from ..case.share import WHOLE, Share, all_shares
+from ..case.solver import face_values
 from ..errors import CaseError, PredictionError, StateError
 from ..fiber import Fibers, Group, Reaction, Stepper, merged_states, prepare
 from ..fiber.state import check_state, forms
@@ -263,7 +264,7 @@ def _mesh(scene: Scene, size, cut: float | None) -> Mesh:
         return Mesh(scene.interpolation, cell, box, cut)
     if scene.application == "boxFoam":  # without the fastest mode of an even number of cells
         return Mesh(scene.interpolation, cell, box, 1 - cell / box, CENTRAL6)
-    return Mesh(scene.interpolation, cell, box, 1.0, CENTRAL2)
+    return Mesh(scene.interpolation, cell, box, 1.0, CENTRAL2, face_values(scene.case))
 
 
 def _of_family(state: dict[str, np.ndarray], name: str) -> dict[str, np.ndarray]:

@@ -17,10 +17,16 @@ d(k) being the weights of the gradient, ikw where it is exact: then, in steady f
 shells of k these are sums of exponentials, each of which needs no history: integrated with the weights with which the
 flow itself takes forces (Adams–Bashforth, the first two steps Runge–Kutta).
 
+pimpleFoam's pressure takes its gradient and the fluxes whose divergence it removes from faces, and its Laplacian from
+cells side by side: of a mode it takes out the part r = Σ 4 sin²(θ/2) g(θ) f(θ) / Σ 4 sin²(θ/2), g and f being the
+responses of face values, θ = k_i Δx. Where waves are as short as cells this is less than all of what is along k:
+1 − r/3 of a force stays, and not 2/3.
+
 A bead that slips leaves its disturbance behind, where Δx times its slip s is not small beside ν. In Oseen's flow a mode
 has 1/(νk² + ik·s) in place of 1/νk², and the mean over directions is that of a rate νk²/g(s/νk),
 
-    g(q) = (3/2) [(1 + 1/q²) arctan(q)/q − 1/q²] for a force along the slip,   arctan(q)/q for a torque.
+    g(q) = (3/2) [(1 + 1/q²) arctan(q)/q − 1/q²] for a force along the slip,   arctan(q)/q for a torque,
+    (3/q²) [1 − arctan(q)/q] for what of the force is along k and stays.
 """
 
 from __future__ import annotations
@@ -37,31 +43,48 @@ CENTRAL2, CENTRAL6 = (
     (1.0,),
     (3 / 2, -3 / 20, 1 / 90),
 )  # Laplacians of OpenFOAM's `Gauss linear`, and of boxFoam
+FACES = {
+    "linear": (1 / 2,),
+    "cubic": (9 / 16, -1 / 16),
+}  # weights of the cells on either side, the nearest first
 ADAMS_BASHFORTH = np.array([23.0, -16.0, 5.0]) / 12
 
 
 class Kernel(NamedTuple):
-    """K(τ) = Σ weight e^(−rate τ): weights (M,), and rates (M,) [1/s]."""
+    """K(τ) = Σ weight e^(−rate τ): weights (M,), rates (M,) [1/s], and what part of it is along k."""
 
     weight: NDArray
     rate: NDArray
+    along: NDArray
 
 
 class Mesh(NamedTuple):
     """How a flow sees a bead. interpolation: of samples; cell, box: their sizes [m]; cut: largest resolved wavenumber
-    in each direction over π/Δx; laplacian: weights c_m of u(+m) − 2u + u(−m), none where derivatives are exact."""
+    in each direction over π/Δx; laplacian: weights c_m of u(+m) − 2u + u(−m), none where derivatives are exact; faces:
+    words of FACES for grad(p) and the fluxes, none where the projection is one."""
 
     interpolation: str
     cell: float
     box: float
     cut: float = 1.0
     laplacian: tuple[float, ...] = ()
+    faces: tuple[str, ...] = ()
 
     def viscous(self, phase: NDArray) -> NDArray:
         """(κΔx)² of one direction at phases kΔx."""
         if not self.laplacian:
             return phase**2
         return sum(2 * c * (1 - np.cos((m + 1) * phase)) for m, c in enumerate(self.laplacian))
+
+    def projected(self, phase: NDArray) -> NDArray | float:
+        """r of modes with phases (..., 3): how much of what is along k the pressure takes out."""
+        if not self.faces:
+            return 1.0
+        compact = 4 * np.sin(phase / 2) ** 2
+        seen = compact.copy()
+        for word in self.faces:
+            seen *= sum(2 * a * np.cos((m + 0.5) * phase) for m, a in enumerate(FACES[word]))
+        return seen.sum(axis=-1) / compact.sum(axis=-1)
 
 
 def kernels(mesh: Mesh, viscosity: float, density: float) -> tuple[Kernel, Kernel]:
@@ -90,14 +113,16 @@ def kernels(mesh: Mesh, viscosity: float, density: float) -> tuple[Kernel, Kerne
         along += d[:, i] ** 2 * own
         along += 2 * d[:, i] * d[:, j] * both[..., i] * both[..., j] * seen[..., m]
 
-    def shells(response: NDArray, factor: float) -> Kernel:
-        at_once = factor * volume * response.mean(axis=1)
-        steady = factor * volume * (response / decay).mean(axis=1)
-        weight = at_once.reshape(SHELLS, -1).sum(axis=1)
-        return Kernel(weight, weight / steady.reshape(SHELLS, -1).sum(axis=1))
+    def shells(across: NDArray, factor: float, along: NDArray | float = 0.0) -> Kernel:
+        def sums(response: NDArray) -> NDArray:
+            return factor * (volume * response.mean(axis=1)).reshape(SHELLS, -1).sum(axis=1)
 
+        weight, steady = sums(across + along), sums((across + along) / decay)
+        return Kernel(weight, weight / steady, 1 - sums(across / decay) / steady)
+
+    felt = seen.prod(axis=2)
     return (
-        shells(seen.prod(axis=2), 2 / (3 * density)),
+        shells(2 / 3 * felt, 1 / density, felt * (1 - mesh.projected(phase)) / 3),
         shells((turned + along) / cell**2, 1 / (12 * density)),
     )
 
@@ -143,12 +168,13 @@ def _slopes(mesh: Mesh, phase: NDArray, seen: NDArray) -> tuple[NDArray, NDArray
     return slope * resolved, both * resolved
 
 
-def _shared(left: NDArray) -> NDArray:
-    """g of s/νk (M, B, 2), for forces and torques."""
+def _shared(left: NDArray, along: NDArray) -> NDArray:
+    """g of s/νk (M, B, 2), for forces and torques, of which so much (M, 1, 2) is along k."""
     q = np.maximum(left, 1e-3)  # below it g is 1 to 1e-6
     turned = np.arctan(q) / q
-    pushed = 1.5 * ((1 + 1 / q[..., 0] ** 2) * turned[..., 0] - 1 / q[..., 0] ** 2)
-    return np.stack([pushed, turned[..., 1]], axis=-1)
+    across = 1.5 * ((1 + 1 / q**2) * turned - 1 / q**2)
+    pushed = across + along * (3 * (1 - turned) / q**2 - across)
+    return np.stack([pushed[..., 0], turned[..., 1]], axis=-1)
 
 
 class OwnDisturbance:
@@ -157,7 +183,9 @@ class OwnDisturbance:
 
     def __init__(self, kernels: tuple[Kernel, Kernel], viscosity: float, drag: float, beads: int):
         self._viscosity, self._drag = viscosity, drag
-        self._weight, self._rate = (np.stack(a, axis=1)[:, None, :, None] for a in zip(*kernels, strict=True))
+        self._weight, self._rate, self._along = (
+            np.stack(a, axis=1)[:, None, :, None] for a in zip(*kernels, strict=True)
+        )
         self._parts = np.zeros((SHELLS, beads, 2, 3))
         self._loads: list[NDArray] = []  # (B, 2, 3), newest first
 
@@ -172,7 +200,7 @@ class OwnDisturbance:
         self._loads = [loads, *self._loads][:3]
         slip = np.linalg.norm(force, axis=1)[:, None] / self._drag
         left = slip / np.sqrt(self._viscosity * self._rate[..., 0])  # s/νk, (M, B, 2)
-        fade = np.exp(-time_step * self._rate / _shared(left)[..., None])
+        fade = np.exp(-time_step * self._rate / _shared(left, self._along[..., 0])[..., None])
         self._parts *= fade
         if len(self._loads) < 3:
             self._parts += time_step / 6 * (fade + 4 * np.sqrt(fade) + 1) * loads

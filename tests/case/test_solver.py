@@ -7,7 +7,7 @@ import pytest
 
 from gbm_plugin.case.disk import needed
 from gbm_plugin.case.scene import read_scene
-from gbm_plugin.case.solver import DIFFERENCES, scheme, stable_courant
+from gbm_plugin.case.solver import DIFFERENCES, face_values, scheme, stable_courant
 from gbm_plugin.errors import CaseError
 
 from conftest import make_case, set_entry
@@ -54,3 +54,20 @@ def test_it_writes_its_modes(path):
     own = needed(read_scene(path))["time_folder"]
     set_entry(path / "system/controlDict", "application", "pimpleFoam")
     assert own - needed(read_scene(path))["time_folder"] == pytest.approx((9 - 6) * 8 * cells)
+
+
+def test_face_values_are_those_that_openfoam_finds(tmp_path):
+    """A name before a pattern, that before the default; of patterns the last."""
+    (tmp_path / "system").mkdir()
+    schemes = tmp_path / "system/fvSchemes"
+
+    def found(gradient: str, fluxes: str) -> tuple[str, str]:
+        schemes.write_text(f"gradSchemes {{ {gradient} }} interpolationSchemes {{ {fluxes} }}")
+        return face_values(tmp_path)
+
+    assert found("default Gauss linear;", "default linear;") == ("linear", "linear")
+    assert found("default Gauss linear; grad(p) Gauss cubic;", "default linear;") == ("cubic", "linear")
+    pattern = '"flux.*" leanCubic; default linear;'
+    assert found("default Gauss cubic;", pattern) == ("cubic", "cubic")
+    assert found("default Gauss linear;", f"flux(HbyA) linear; {pattern}") == ("linear", "linear")
+    assert found("default Gauss linear;", f'{pattern} "flux.H.*" linear;') == ("linear", "linear")
