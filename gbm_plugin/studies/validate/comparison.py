@@ -78,11 +78,11 @@ def make(
     )
 
 
-def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str) -> State:
-    """Run a copy from `make` in "openfoam" or "spectral". interpolation: of the flow at the beads. Raises as
-    `gbm_plugin.run.openfoam.run`."""
+def run(copy: Path, cells: int, steps: int, engine: str, interpolation: str, fibers: int = 50) -> State:
+    """Run a copy from `make` in "openfoam" or "spectral". interpolation: of the flow at the beads. fibers: in each
+    family. Raises as `gbm_plugin.run.openfoam.run`."""
     spectral = engine == "spectral"
-    words = three_families(50, steps, 1e-6, interpolation)
+    words = three_families(fibers, steps, 1e-6, interpolation)
     (copy / "constant/fiberProperties").write_text(HEADER + words)
     (run_spectral if spectral else run_openfoam)(copy)
     folder = copy / "spectral" if spectral else copy

@@ -25,10 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, run, "cells", "in each direction, one mesh after the other")
     option(parser, run, "time_step", "of the coarsest mesh, others in proportion [s]")
     option(parser, run, "seed", "of the initial field")
+    option(parser, run, "fibers", "in each family")
 
 
 def run(
-    case: Path | str, cells: Sequence[int] = (24, 32, 48, 64), time_step: float = 0.08, seed: int = 1
+    case: Path | str,
+    cells: Sequence[int] = (24, 32, 48, 64),
+    time_step: float = 0.08,
+    seed: int = 1,
+    fibers: int = 50,
 ) -> dict:
     """Errors of OpenFOAM against the spectral solver at the same time.
 
@@ -43,16 +48,16 @@ def run(
     with tempfile.TemporaryDirectory(prefix="gbm-validate-") as folder:
         for n in cells:
             steps = round(END_TIME / (time_step * cells[0] / n))
-            rows.append(_compare(Path(case), Path(folder) / str(n), n, steps, seed))
+            rows.append(_compare(Path(case), Path(folder) / str(n), n, steps, seed, fibers))
     return {"end_time": END_TIME, "viscosity": VISCOSITY, "rows": rows, "orders": observed_orders(rows)}
 
 
-def _compare(case: Path, copy: Path, n: int, steps: int, seed: int) -> dict:
+def _compare(case: Path, copy: Path, n: int, steps: int, seed: int, fibers: int) -> dict:
     comparison.make(case, copy, n, steps, seed)
     seconds, states = {}, {}
     for engine, word in (("openfoam", comparison.sampling_word(case)), ("spectral", "exact")):
         start = time.perf_counter()
-        states[engine] = comparison.run(copy, n, steps, engine, word)
+        states[engine] = comparison.run(copy, n, steps, engine, word, fibers)
         seconds[engine] = time.perf_counter() - start
     ours, reference = states["openfoam"], states["spectral"]
     result = {
