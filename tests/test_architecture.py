@@ -22,7 +22,8 @@ FLOORS = [
     {"studies"},
     {"cli"},
 ]
-ALLOWED = {("case", "gbm_plugin.fiber.model")}  # the words of the model, and nothing else of it
+# the words of the model, and nothing else of it
+ALLOWED = {(folder, "gbm_plugin.fiber.model") for folder in ("case", "statistics")}
 
 
 def modules() -> dict[str, Path]:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..fiber.model import AFFORDABLE
 from .dictionary import Dictionary
 from .disk import needed, writes
 from .scene import Family, Scene
-from .verdict import AFFORDABLE, sub_steps
+from .verdict import sub_steps
 
 # the task by which machines are compared, and its time where these were measured [s of one core]
 TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 15

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..fiber.model import AFFORDABLE
 from .dictionary import Dictionary
 from .disk import readable, writes
 from .scene import Family, Scene
 from .solver import scheme
-from .verdict import AFFORDABLE, sub_steps
+from .verdict import sub_steps
 
 FIBERS = "constant/fiberProperties"
 WORDS = {"freeDrain": "free drain", "rpy": "RPY"}

@@ -24,7 +24,6 @@ FORECAST = (
     1e-3,
     1e-2,
 )  # error of L in tau_eta of beads that go on from one sample a step, extrapolated along their paths
-AFFORDABLE = 12  # sub-steps of ab3 that auto takes before it goes over to implicit
 SUB_STEPS = (1000, 1_000_000)  # of ab3: dear, and refused
 ENDS = (1e-2, 5e-2)  # error of the ends of a fiber by its number of beads
 BEADS = (

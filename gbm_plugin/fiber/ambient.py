@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..compiled import kernel
+from ..compiled import kernel, only_read
 from ..sampling import lagrange_weights
 from ..threads import COPYING, in_shares
 from .layout import pack, unpack
-from .simd import LANES
+from .simd import LANES, blank, load, splat, store
 
 SAMPLES = 3  # in the polynomial in time
 KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction
@@ -25,6 +26,22 @@ def _squared_gap(share, shares, new, first, second, third, weights, square):
                 square[b, lane] += (new[b, row, lane] - predicted) ** 2
 
 
+@kernel
+def _receive(share, shares, velocity, rotation, velocities, rotations, sums):
+    """Both fields (F, rows) as blocks (B, rows, LANES); sums (B, LANES): of all numbers of a fiber."""
+    last = velocity.shape[0] - 1
+    for b in range(share, sums.shape[0], shares):
+        total = splat(0.0)
+        for field, blocks in ((velocity, velocities), (rotation, rotations)):
+            for lane in range(LANES):
+                fiber = min(b * LANES + lane, last)
+                for row in range(field.shape[1]):
+                    blocks[b, row, lane] = field[fiber, row]
+            for row in range(field.shape[1]):
+                total = total + load(blocks[b], row)
+        store(sums, b, total)
+
+
 class Ambient:
     """The newest samples of velocity and rotation at the beads, newest last."""
 
@@ -36,19 +53,26 @@ class Ambient:
     def __len__(self) -> int:
         return len(self.times)
 
-    def observe(self, time: float, velocity, rotation) -> None:
-        """Take a sample (F, N, 3) of each; one at the newest time replaces that one."""
+    def observe(self, time: float, velocity: NDArray, rotation: NDArray) -> bool:
+        """Take a sample (F, N, 3) of each, and say whether all of it is finite; one at the newest time replaces that
+        one."""
         if self.times and time < self.times[-1]:
             raise ValueError(f"sample at time {time:g} is older than the last one, at {self.times[-1]:g}")
-        buffers = (None, None)
         if self.times and time == self.times[-1]:
-            buffers = self.samples.pop()
+            own = self.samples.pop()
             self.times.pop()
         elif len(self.times) == KEPT:
-            buffers = self.samples.pop(0)
+            own = self.samples.pop(0)
             self.times.pop(0)
+        else:
+            fibers, beads = self.shape
+            own = blank(-(-fibers // LANES), 3 * beads), blank(-(-fibers // LANES), 3 * beads)
+        sums = blank(len(own[0]))
+        fields = (only_read(field.reshape(self.shape[0], -1)) for field in (velocity, rotation))
+        in_shares(_receive, 2 * COPYING * self.shape[0] * self.shape[1], *fields, *own, sums)
         self.times.append(float(time))
-        self.samples.append((pack(velocity, buffers[0]), pack(rotation, buffers[1])))
+        self.samples.append(own)
+        return bool(np.isfinite(sums).all())
 
     def forget(self, after: float) -> None:
         """Drop the samples of later times."""
@@ -74,7 +98,7 @@ class Ambient:
         weights[: len(before)] = lagrange_weights(before, self.times[-1])
         predictors = [velocity for velocity, _ in earlier] + [earlier[0][0]] * (SAMPLES - len(earlier))
         new = self.samples[-1][0]
-        square = np.zeros((len(new), LANES))
+        square = blank(len(new))
         beads = self.shape[0] * self.shape[1]
         in_shares(_squared_gap, COPYING * beads, new, *predictors, weights, square)
         return np.sqrt(square.reshape(-1)[: self.shape[0]] / self.shape[1])

@@ -36,7 +36,7 @@ class Samples(NamedTuple):
 
 class Chain(NamedTuple):
     """Eight fibers: links (3N, LANES), unit links i → i + 1 and in the last place the centre of mass; beta, lanes
-    of bending.velocity_scale; bead radius; law, the place of the curvature law among bending.CURVATURE_LAWS."""
+    of bending.velocity_scale; bead radius; law, the place of the curvature law among model.CURVATURE_LAWS."""
 
     links: Any
     beta: Any

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiled import inlined, kernel, only_read
 from ..threads import COPYING, in_shares
-from .simd import LANES, add, add_scaled, arithmetic, cross, dot, load3, scale, store3, subtract, zero3
+from .simd import LANES, add, add_scaled, arithmetic, blank, cross, dot, load3, scale, store3, subtract, zero3
 
 
 @kernel
@@ -31,7 +31,7 @@ def pack(values: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     """(F, …) as blocks (B, rows, LANES)."""
     flat = only_read(np.asarray(values, dtype=float).reshape(len(values), -1))
     if out is None:
-        out = np.empty((-(-len(values) // LANES), flat.shape[1], LANES))
+        out = blank(-(-len(values) // LANES), flat.shape[1])
     in_shares(_pack, COPYING * flat.size / 3, flat, out)
     return out
 
@@ -44,10 +44,11 @@ def unpack(blocks: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 @kernel
-def bead_positions(share, shares, state, diameter, positions):
-    """Bead centres (F, N, 3) from links and centre of mass (B, 3N, LANES), the centre in the last place."""
+def bead_positions(share, shares, state, diameter, scratch, positions):
+    """Bead centres (F, N, 3) from links and centre of mass (B, 3N, LANES), the centre in the last place; scratch
+    (threads, 3N or more, LANES)."""
     beads = positions.shape[1]
-    local = np.empty((3 * beads, LANES))
+    local = scratch[share]
     for b in range(share, state.shape[0], shares):
         block = state[b]
         bead, total = zero3(), zero3()

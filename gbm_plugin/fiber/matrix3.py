@@ -84,6 +84,24 @@ def apply(a, x):
 
 
 @arithmetic
+def transposed(m):
+    """mᵀ."""
+    return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
+
+
+@arithmetic
+def apply_transposed(a, x):
+    """aᵀ x."""
+    return apply(transposed(a), x)
+
+
+def by_columns(function, a, m):
+    """function(a, v) of each column v of m, as the columns of a matrix."""
+    columns = [function(a, m[c::3]) for c in range(3)]
+    return tuple(columns[c][r] for r in range(3) for c in range(3))
+
+
+@arithmetic
 def inverse(m):
     """Inverse by cofactors."""
     c0 = m[4] * m[8] - m[5] * m[7]
@@ -147,13 +165,13 @@ def scaled(c, m):
 @arithmetic
 def minus_product_transposed(m, a, b):
     """m − a bᵀ."""
-    return minus_product(m, a, (b[0], b[3], b[6], b[1], b[4], b[7], b[2], b[5], b[8]))
+    return minus_product(m, a, transposed(b))
 
 
 @arithmetic
 def minus_transposed_product(m, a, b):
     """m − aᵀ b."""
-    return minus_product(m, (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]), b)
+    return minus_product(m, transposed(a), b)
 
 
 @arithmetic

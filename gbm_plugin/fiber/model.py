@@ -1,4 +1,5 @@
-"""The choices of the model: every option with its words, its default and its checks, here and nowhere else.
+"""The choices of the model: every option with its words, its default and its checks, and the limits of auto's own
+choice, here and nowhere else.
 
 A field is a keyword of `Fibers` (those of FiberOptions) or of `Stepper` and `simulate` (those of MotionOptions); in
 constant/fiberProperties it is an entry in camel case: bending_torque is bendingTorque.
@@ -14,6 +15,10 @@ INTEGRATORS = ("ab3", "implicit", "auto")
 MOBILITIES = ("freeDrain", "rpy")
 BENDING_TORQUES = ("consistent", "asPrinted")
 CURVATURE_LAWS = ("sine", "discreteRod")
+AFFORDABLE = (
+    12  # sub-steps of ab3 that cost as much as an implicit step (docs/accuracy.md): so many auto takes,
+)
+DIVIDED = 4  # times the implicit steps that a flow step is divided into, so many at most
 
 
 class ModelError(ValueError):

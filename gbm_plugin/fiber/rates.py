@@ -12,7 +12,7 @@ from .fibers import Fibers
 from .layout import pack, unpack
 from .mobility import work_rows
 from .model import CURVATURE_LAWS, MotionOptions
-from .simd import load
+from .simd import blank, load
 
 
 @woven
@@ -52,8 +52,8 @@ def instant_rates(fibers: Fibers, velocity, rotation, mobility="freeDrain"):
 
 def rates_of_blocks(fibers: Fibers, state, velocity, rotation, mobility):
     """The same of fibers that have moved: links and centres, velocity, rotation in blocks (B, 3N, LANES)."""
-    rates, multipliers = np.zeros_like(state), np.zeros((len(state), state.shape[1] - 3, state.shape[2]))
-    work = np.zeros((work_rows(mobility, fibers.beads, implicit=False), state.shape[2]))
+    rates, multipliers = blank(*state.shape[:2]), blank(len(state), state.shape[1] - 3)
+    work = blank(work_rows(mobility, fibers.beads, implicit=False))
     _EVALUATE[mobility](material(fibers), state, velocity, rotation, work, multipliers, rates)
     drag = 6 * np.pi * fibers.viscosity * fibers.radius
     forces = drag * unpack(multipliers, (fibers.count, fibers.beads - 1, 3))
@@ -63,5 +63,5 @@ def rates_of_blocks(fibers: Fibers, state, velocity, rotation, mobility):
 
 def material(fibers: Fibers) -> Material:
     """What kernels know of these fibers."""
-    beta = np.ascontiguousarray(pack(velocity_scale(fibers))[:, 0])
+    beta = pack(velocity_scale(fibers))[:, 0]
     return Material(CURVATURE_LAWS.index(fibers.curvature_law), float(fibers.radius), beta)

@@ -28,7 +28,10 @@ from .bending import moment, rod_factor
 from .blocks import take
 from .layout import difference, mean_vector
 from .matrix3 import (
+    apply,
     apply_symmetric,
+    apply_transposed,
+    by_columns,
     cross_symmetric,
     identity_plus,
     minus,
@@ -39,6 +42,7 @@ from .matrix3 import (
     plus_outer,
     scaled,
     times_cross,
+    transposed,
 )
 from .simd import (
     add,
@@ -47,14 +51,12 @@ from .simd import (
     cross,
     dot,
     larger,
-    load,
     load3,
     load6,
     scale,
     select_less,
     splat,
     sqrt,
-    store,
     store3,
     store6,
     subtract,
@@ -143,7 +145,7 @@ class _Parts(NamedTuple):
 
 class _StageParts(NamedTuple):
     """More scratch of a stage: response of the gaps to joint moments, the joints' matrix and moments; gaps without
-    bending, gaps ahead; slips and gaps of three columns at once."""
+    bending, gaps ahead; slips of three columns at once."""
 
     bending: Any
     matrix: Any
@@ -151,7 +153,6 @@ class _StageParts(NamedTuple):
     free: Any
     ahead: Any
     slips: Any
-    columns: Any
 
 
 @register_jitable
@@ -183,30 +184,13 @@ def stage_layout(work, beads):
     free, at = take(work, at, n + 3)
     ahead, at = take(work, at, n)
     slips, at = take(work, at, 3 * n)
-    columns, at = take(work, at, 3 * (n + 3))
-    return (parts, _StageParts(bending, matrix, moments, free, ahead, slips, columns)), at
+    return (parts, _StageParts(bending, matrix, moments, free, ahead, slips)), at
 
 
 @inlined
 def _slip(state, v, s, i):
     """v_i − v_(i+1) − e_i × (s_i + s_(i+1)): what rolling contact forbids."""
     return subtract(scale(-1.0, difference(v, i)), cross(load3(state, i), add(load3(s, i), load3(s, i + 1))))
-
-
-@inlined
-def _dot_rows(a, first_a, stride, b, first_b, count):
-    """Σ a[first_a + k stride] b[first_b + k], in four sums so that they do not wait for each other."""
-    s0, s1, s2, s3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
-    fours = count - count % 4
-    for k in range(0, fours, 4):
-        at = first_a + k * stride
-        s0 = s0 + load(a, at) * load(b, first_b + k)
-        s1 = s1 + load(a, at + stride) * load(b, first_b + k + 1)
-        s2 = s2 + load(a, at + 2 * stride) * load(b, first_b + k + 2)
-        s3 = s3 + load(a, at + 3 * stride) * load(b, first_b + k + 3)
-    for k in range(fours, count):
-        s0 = s0 + load(a, first_a + k * stride) * load(b, first_b + k)
-    return (s0 + s1) + (s2 + s3)
 
 
 # matrices of scratch, row by row, in blocks of 3 × 3; `blocks`: of which each row has so many
@@ -301,21 +285,55 @@ def _divided(m, corner):
 
 
 @arithmetic
+def _forth(corner, v):
+    """L⁻¹ v."""
+    x = corner[0] * v[0]
+    y = corner[4] * (v[1] - corner[3] * x)
+    return x, y, corner[8] * (v[2] - corner[6] * x - corner[7] * y)
+
+
+@arithmetic
+def _back(corner, v):
+    """L⁻ᵀ v."""
+    z = corner[8] * v[2]
+    y = corner[4] * (v[1] - corner[7] * z)
+    return corner[0] * (v[0] - corner[3] * y - corner[6] * z), y, z
+
+
+@arithmetic
 def _forward(corner, m):
     """L⁻¹ m."""
-    x = scale(corner[0], m[0:3])
-    y = scale(corner[4], add_scaled(m[3:6], -1.0 * corner[3], x))
-    z = scale(corner[8], add_scaled(add_scaled(m[6:9], -1.0 * corner[6], x), -1.0 * corner[7], y))
-    return (*x, *y, *z)
+    return by_columns(_forth, corner, m)
 
 
 @arithmetic
 def _backward(corner, m):
     """L⁻ᵀ m."""
-    z = scale(corner[8], m[6:9])
-    y = scale(corner[4], add_scaled(m[3:6], -1.0 * corner[7], z))
-    x = scale(corner[0], add_scaled(add_scaled(m[0:3], -1.0 * corner[3], y), -1.0 * corner[6], z))
-    return (*x, *y, *z)
+    return by_columns(_back, corner, m)
+
+
+@arithmetic
+def _eliminated(m):
+    """L and Uᵀ of m = L U in one, L with ones on its diagonal; that of U inverted. Transposed, _divided and _back
+    take it for m U⁻¹ and U⁻¹ v."""
+    r0 = 1.0 / m[0]
+    l10, l20 = m[3] * r0, m[6] * r0
+    r1, u12 = 1.0 / (m[4] - l10 * m[1]), m[5] - l10 * m[2]
+    l21 = (m[7] - l20 * m[1]) * r1
+    return r0, m[1], m[2], l10, r1, u12, l20, l21, 1.0 / (m[8] - l20 * m[2] - l21 * u12)
+
+
+@arithmetic
+def _reduced(lower, v):
+    """L⁻¹ v, L as _eliminated gives it."""
+    y = v[1] - lower[3] * v[0]
+    return v[0], y, v[2] - lower[6] * v[0] - lower[7] * y
+
+
+@arithmetic
+def _reduced_block(lower, m):
+    """L⁻¹ m, as _reduced."""
+    return by_columns(_reduced, lower, m)
 
 
 @part
@@ -366,26 +384,28 @@ def _slip_block(gap, beta, after, e, turned):
 def roll(state, factor, gaps, v, s, multipliers, out):
     """Multipliers that stop the slip of velocities v and spins s; out: resulting gaps and mean velocity."""
     links = state.shape[0] // 3 - 1
-    n = 3 * links
     for i in range(links):
-        store3(multipliers, i, scale(-1.0, _slip(state, v, s, i)))
-    for i in range(n):
-        rest = load(multipliers, i) - _dot_rows(factor, i * n, 1, multipliers, 0, i)
-        store(multipliers, i, rest * load(factor, i * n + i))
-    for back in range(n):
-        i = n - 1 - back
-        rest = load(multipliers, i) - _dot_rows(factor, (i + 1) * n + i, n, multipliers, i + 1, back)
-        store(multipliers, i, rest * load(factor, i * n + i))
-    for i in range(links):
-        store3(out, i, difference(v, i))
-    store3(out, links, mean_vector(v, links + 1))
-    for row in range(n + 3):
-        store(out, row, load(out, row) + _dot_rows(gaps, row * n, 1, multipliers, 0, n))
+        x = scale(-1.0, _slip(state, v, s, i))
+        for k in range(i):
+            x = subtract(x, apply(_block(factor, links, i, k), load3(multipliers, k)))
+        store3(multipliers, i, _forth(_block(factor, links, i, i), x))
+    for back in range(links):
+        i = links - 1 - back
+        x = load3(multipliers, i)
+        for k in range(i + 1, links):
+            x = subtract(x, apply_transposed(_block(factor, links, k, i), load3(multipliers, k)))
+        store3(multipliers, i, _back(_block(factor, links, i, i), x))
+    for i in range(links + 1):
+        x = difference(v, i) if i < links else mean_vector(v, links + 1)
+        for k in range(links):
+            x = add(x, apply(_block(gaps, links, i, k), load3(multipliers, k)))
+        store3(out, i, x)
 
 
 @part
-def _roll_columns(factor, gaps, links, x, out):
-    """As roll for three columns at once: x, their slips, is overwritten; out, their gaps, is completed."""
+def _roll_columns(factor, gaps, links, x, out, joint):
+    """As roll for three columns at once: x, their slips, is overwritten; their gaps, in the place of the joint in out,
+    are completed."""
     for i in range(links):
         m = _block(x, 1, i, 0)
         for k in range(i):
@@ -398,10 +418,10 @@ def _roll_columns(factor, gaps, links, x, out):
             m = minus_transposed_product(m, _block(factor, links, k, i), _block(x, 1, k, 0))
         _store_block(x, 1, i, 0, _backward(_block(factor, links, i, i), m))
     for i in range(links + 1):
-        m = _block(out, 1, i, 0)
+        m = _block(out, links - 1, i, joint)
         for k in range(links):
             m = minus_product(m, _block(gaps, links, i, k), _block(x, 1, k, 0))
-        _store_block(out, 1, i, 0, m)
+        _store_block(out, links - 1, i, joint, m)
 
 
 @part
@@ -507,10 +527,11 @@ def _along(t, here, u, before):
 
 
 @inlined
-def _moment_columns(state, g, j, law):
-    """Change of the moment at bead j in three columns of changes g of the links."""
+def _moment_columns(state, g, joint, j, law):
+    """Change of the moment at bead j under the changes g of the links in the columns of a joint."""
+    joints = state.shape[0] // 3 - 2
     t, u = load3(state, j - 1), load3(state, j)
-    before, here = _block(g, 1, j - 1, 0), _block(g, 1, j, 0)
+    before, here = _block(g, joints, j - 1, joint), _block(g, joints, j, joint)
     f = splat(1.0)
     if law == 1:
         f = rod_factor(t, u)
@@ -527,9 +548,9 @@ def _identity_less(own, factor, m):
 
 
 @inlined
-def _joint_columns(state, pairs, j, slips, columns):
-    """Slips and gaps, and in the last place the mean velocity, from unit moments at joint j: they turn the bead before
-    it forth and the bead behind it back."""
+def _joint_columns(state, pairs, j, slips, out):
+    """Slips and gaps, and in the last place the mean velocity, from unit moments at bead j: they turn the bead before
+    it forth and the bead behind it back. out: in the place of joint j − 1."""
     links = state.shape[0] // 3 - 1
     _, r, coupling, _, all_coupling = pairs
     for i in range(links):
@@ -538,16 +559,41 @@ def _joint_columns(state, pairs, j, slips, columns):
         q = subtract(q, subtract(_coupling(coupling, i, j + 1), _coupling(coupling, i + 1, j + 1)))
         spin = minus(plus(load6(r, a), load6(r, c)), plus(load6(r, b), load6(r, d)))
         gap = _turned(scale(-4.0 / 3.0, q))
-        _store_block(columns, 1, i, 0, gap)
+        _store_block(out, links - 1, i, j - 1, gap)
         _store_block(slips, 1, i, 0, _joint_slip(gap, cross_symmetric(load3(state, i), spin)))
     q = subtract(load3(all_coupling, j - 1), load3(all_coupling, j + 1))
-    _store_block(columns, 1, links, 0, _turned(scale(4.0 / 3.0 / (links + 1), q)))
+    _store_block(out, links - 1, links, j - 1, _turned(scale(4.0 / 3.0 / (links + 1), q)))
 
 
 @arithmetic
 def _joint_slip(gap, turned):
     """−gap − 4/3 [e]× R."""
     return tuple(-1.0 * a - 4.0 / 3.0 * b for a, b in zip(gap, turned, strict=True))
+
+
+@part
+def _solve(matrix, blocks, x):
+    """x = matrix⁻¹ x, by elimination in blocks; the matrix is overwritten."""
+    for k in range(blocks):
+        lower = _eliminated(_block(matrix, blocks, k, k))
+        upper = transposed(lower)
+        _store_block(matrix, blocks, k, k, upper)
+        own = _reduced(lower, load3(x, k))
+        store3(x, k, own)
+        for j in range(k + 1, blocks):
+            _store_block(matrix, blocks, k, j, _reduced_block(lower, _block(matrix, blocks, k, j)))
+        for i in range(k + 1, blocks):
+            ratio = _divided(_block(matrix, blocks, i, k), upper)
+            for j in range(k + 1, blocks):
+                m = minus_product(_block(matrix, blocks, i, j), ratio, _block(matrix, blocks, k, j))
+                _store_block(matrix, blocks, i, j, m)
+            store3(x, i, subtract(load3(x, i), apply(ratio, own)))
+    for back in range(blocks):
+        k = blocks - 1 - back
+        rest = load3(x, k)
+        for j in range(k + 1, blocks):
+            rest = subtract(rest, apply(_block(matrix, blocks, k, j), load3(x, j)))
+        store3(x, k, _back(_block(matrix, blocks, k, k), rest))
 
 
 @part
@@ -561,42 +607,31 @@ def stage(chain, flow, ahead, work, motion):
     history, _, sigma = ahead
     rates, multipliers = motion
     links = state.shape[0] // 3 - 1
-    n, m = 3 * links, 3 * (links - 1)
+    joints = links - 1
     (common, own), _ = stage_layout(work, links + 1)
     pairs, factor, gaps, v, s, _ = common
-    bending, matrix, moments, free, g, slips, columns = own
+    bending, matrix, moments, free, g, slips = own
     assemble(state, pairs, factor, gaps)
-    for j in range(1, links):
-        _joint_columns(state, pairs, j, slips, columns)
-        _roll_columns(factor, gaps, links, slips, columns)
-        for row in range(n + 3):
-            store3(bending, row * (links - 1) + j - 1, load3(columns, row))
-        for i in range(1, links):
-            change = _moment_columns(state, columns, i, law)
-            own = splat(1.0) if i == j else splat(0.0)
-            _store_block(matrix, links - 1, i - 1, j - 1, _identity_less(own, beta * sigma, change))
+    for j in range(joints):
+        _joint_columns(state, pairs, j + 1, slips, bending)
+        _roll_columns(factor, gaps, links, slips, bending, j)
+        for i in range(joints):
+            change = _moment_columns(state, bending, j, i + 1, law)
+            unit = splat(1.0) if i == j else splat(0.0)
+            _store_block(matrix, joints, i, j, _identity_less(unit, beta * sigma, change))
     ambient(flow, radius, v, s)
     roll(state, factor, gaps, v, s, multipliers, free)
     for i in range(links):
         turned = cross(load3(history, i), load3(state, i))
         store3(g, i, add_scaled(load3(free, i), 2.0 * radius, turned))
-    for j in range(1, links):
-        bend, change = _moment_change(state, g, j, law)
-        store3(moments, j - 1, scale(beta, add_scaled(bend, sigma, change)))
-    for k in range(m):
-        inverse = 1.0 / load(matrix, k * m + k)
-        for i in range(k + 1, m):
-            ratio = load(matrix, i * m + k) * inverse
-            for j in range((k + 1) // 3, links - 1):  # by threes: what is left of the pivot is not read again
-                here = load3(matrix, i * (links - 1) + j)
-                here = add_scaled(here, -1.0 * ratio, load3(matrix, k * (links - 1) + j))
-                store3(matrix, i * (links - 1) + j, here)
-            store(moments, i, load(moments, i) - ratio * load(moments, k))
-    for back in range(m):
-        i = m - 1 - back
-        rest = load(moments, i) - _dot_rows(matrix, i * m + i + 1, 1, moments, i + 1, back)
-        store(moments, i, rest / load(matrix, i * m + i))
-    for row in range(n + 3):
-        store(rates, row, load(free, row) + _dot_rows(bending, row * m, 1, moments, 0, m))
-    for i in range(links):
-        store3(rates, i, scale(0.5 / radius, cross(load3(state, i), load3(rates, i))))
+    for j in range(joints):
+        bend, change = _moment_change(state, g, j + 1, law)
+        store3(moments, j, scale(beta, add_scaled(bend, sigma, change)))
+    _solve(matrix, joints, moments)
+    for i in range(links + 1):
+        x = load3(free, i)
+        for j in range(joints):
+            x = add(x, apply(_block(bending, joints, i, j), load3(moments, j)))
+        if i < links:
+            x = scale(0.5 / radius, cross(load3(state, i), x))
+        store3(rates, i, x)

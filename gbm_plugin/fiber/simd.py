@@ -10,6 +10,7 @@ Everybody else calls the same function with numbers or NumPy arrays.
 """
 
 import inspect
+import math
 import operator
 
 import numpy as np
@@ -18,8 +19,10 @@ from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import PrimitiveModel
 from numba.extending import intrinsic, lower_builtin, register_model, type_callable
+from numpy.typing import NDArray
 
 LANES = 8
+LINE = 64  # bytes of a line of the cache: an instruction that crosses its border takes twice as long
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _FUSE = ("contract",)  # multiply and add may become one instruction; NaN and signed zero keep their meaning
 
@@ -218,6 +221,14 @@ def smaller(left, right):
 
 
 # arrays of lanes, and of tuples of so many lanes
+
+
+def blank(*shape: int) -> NDArray:
+    """Zeros (*shape, LANES), every row of lanes in one line of the cache."""
+    size = math.prod(shape) * LANES
+    room = np.zeros(size + LINE // 8)
+    first = -room.ctypes.data % LINE // 8
+    return room[first : first + size].reshape(*shape, LANES)
 
 
 def _pointers(context, builder, array_type, array, i, count):

@@ -16,19 +16,17 @@ from .blocks import Samples
 from .contact import repulsion_velocity
 from .fibers import TOUCHING, Fibers, positive
 from .layout import bead_positions, pack, unpack
-from .model import MotionOptions
+from .model import AFFORDABLE, DIVIDED, MotionOptions
 from .rates import material, rates_of_blocks
 from .reaction import EXERT, Reaction, implicit_sigma, powers_of
 from .reaction import scratch_rows as reaction_rows
-from .simd import LANES
+from .simd import LANES, blank
 from .state import check_state
 from .strain import with_strain
 
 TOLERANCE = 1e-3  # bead displacement over fiber length, and
 SHARE = 0.1  # of it, the most that one accepted step may add
 MOST_SUBSTEPS = 1_000_000  # of a flow step, by ab3
-AFFORDABLE = 12  # sub-steps of ab3 that cost as much as an implicit step (docs/accuracy.md),
-DIVIDED = 4  # of which a flow step is taken for so many at most
 SMALLEST_STEP = 1e-20  # of a flow step, by implicit: stiff sharp folds open within 1e-14
 LOST = 0.5  # [rad] estimated error of a sub-step of ab3 beyond which its links point nowhere in particular
 
@@ -70,12 +68,13 @@ class Stepper:
         self._material = material(fibers)
         # before and after the last step: links and centre; multipliers; rates w_(n−1), w_(n−2) and their ages
         self._state = pack(np.concatenate([fibers.links, fibers.centres[:, None]], axis=1))
-        self._last = np.zeros_like(self._state)
-        self._multipliers = np.zeros_like(self._state[:, 3:])
-        self._last_multipliers = np.zeros_like(self._multipliers)
-        self._last_rates = [np.zeros_like(self._state) for _ in range(2)]
+        blocks, rows = self._state.shape[:2]
+        self._last = blank(blocks, rows)
+        self._multipliers = blank(blocks, rows - 3)
+        self._last_multipliers = blank(blocks, rows - 3)
+        self._last_rates = [blank(blocks, rows) for _ in range(2)]
         self._rates = list(self._last_rates)
-        self._spare = [np.zeros_like(self._state) for _ in range(2)]
+        self._spare = [blank(blocks, rows) for _ in range(2)]
         self._last_ages: list[float] = []
         self._ages: list[float] = []
         self._last_step = np.full(fibers.count, np.inf)  # suggested to each fiber
@@ -84,7 +83,7 @@ class Stepper:
         self._last_tension = 0.0
         self._tension = 0.0
         self._start, self._length = self.time, 0.0  # of the last step
-        self._scratch = np.zeros((available(), self._scratch_rows(), LANES))
+        self._scratch = blank(available(), self._scratch_rows())
         self._counts = {
             "steps": 0,
             "ab3_steps": 0,
@@ -102,7 +101,15 @@ class Stepper:
     def positions(self) -> np.ndarray:
         """(F, N, 3) bead centres now, unwrapped."""
         positions = np.empty((self.fibers.count, self.fibers.beads, 3))
-        in_shares(bead_positions, COPYING * self._beads, self._state, 2 * self.fibers.radius, positions)
+        in_shares(
+            bead_positions,
+            COPYING * self._beads,
+            self._state,
+            2 * self.fibers.radius,
+            self._scratch,
+            positions,
+            most=len(self._scratch),
+        )
         return positions
 
     @property
@@ -170,26 +177,35 @@ class Stepper:
             raise ValueError(f"sample is of time {time:g}; the fibers are at time {self.time:g}")
         self._near()
         tail = (3, 3) if self.need == "gradient" else (3,)
-        velocity, extra = self._field("velocity", velocity, (3,)), self._field(self.need, extra, tail)
+        given = {
+            "velocity": self._field("velocity", velocity, (3,)),
+            self.need: self._field(self.need, extra, tail),
+        }
+        own, turning = given.values()
         if self.need == "gradient":
-            velocity, extra = with_strain(self.positions, velocity, extra, self.fibers.radius)
+            own, turning = with_strain(self.positions, own, turning, self.fibers.radius)
         if self.repulsion:
             self._push = repulsion_velocity(self.positions, 2 * self.fibers.radius, self.repulsion)
-            velocity = velocity + self._push
-        self._ambient.observe(time, velocity, extra)
+            own = own + self._push
+        if not self._ambient.observe(time, own, turning):
+            self._refuse(given)
 
     def _field(self, name: str, values: ArrayLike | None, tail: tuple[int, ...]) -> NDArray:
-        """Sampled values, if they are (F, N, *tail) and finite."""
+        """Sampled values, if they are (F, N, *tail)."""
         array, shape = np.asarray(values, dtype=float), (self.fibers.count, self.fibers.beads, *tail)
         if array.shape != shape:
             raise ValueError(f"sampled {name} has shape {array.shape}; it must be {shape}")
-        if not np.isfinite(array.sum()):
-            wrong = np.flatnonzero(~np.isfinite(array).reshape(len(array), -1).all(axis=1))
-            raise FloatingPointError(
-                f"sampled {name} is not finite at fiber {wrong[0]}, time {self.time:g}, "
-                f"after step {self._counts['steps']}"
-            )
         return array
+
+    def _refuse(self, given: Mapping[str, NDArray]) -> None:
+        """FloatingPointError naming the first fiber at which one of the sampled fields is not finite."""
+        for name, field in given.items():
+            wrong = np.flatnonzero(~np.isfinite(field).reshape(len(field), -1).all(axis=1))
+            if len(wrong):
+                raise FloatingPointError(
+                    f"sampled {name} is not finite at fiber {wrong[0]}, time {self.time:g}, "
+                    f"after step {self._counts['steps']}"
+                )
 
     def reaction(self, time_step: float) -> Reaction:
         """Force and torque (F, N, 3) of every bead on the fluid at the newest sample, which is of the present time,
@@ -204,11 +220,11 @@ class Stepper:
         fibers, mu = self.fibers, self.fibers.viscosity
         if self._reacting is None:
             rows = reaction_rows(self.mobility, fibers.beads)
-            self._reacting = np.zeros((available(), rows, LANES))
+            self._reacting = blank(available(), rows)
         velocity, rotation = self._ambient.samples[-1]
         drag = 6 * np.pi * mu * fibers.radius
         sizes, out = np.array([drag, drag * fibers.radius]), np.empty((fibers.count, 2, fibers.beads, 3))
-        powers = np.zeros((len(self._state), 3, LANES))
+        powers = blank(len(self._state), 3)
         in_shares(
             EXERT[self.mobility, self.integrator != "ab3"],
             self._beads,
@@ -303,10 +319,20 @@ class Stepper:
         if count <= AFFORDABLE * np.clip(self._length / self._step, 1, DIVIDED).mean():
             error = self._explicit(count)
             self._multipliers[:] = self._last_multipliers  # from which a later implicit step goes on
+            if not np.isfinite(error).all():
+                self._forget_lost()
             self._implicit(everyone[~(error <= self.tolerance)])
         else:
             self._ages = []
             self._implicit(everyone)
+
+    def _forget_lost(self) -> None:
+        """After an attempt that went wrong: its rates make no history, and lanes beyond the last fiber stay."""
+        self._ages = []
+        for rates in self._rates:
+            np.nan_to_num(rates, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+        lost = ~np.isfinite(self._state).all(axis=1)
+        np.copyto(self._state, self._last, where=lost[:, None])
 
     def _substeps(self) -> int:
         """Sub-steps that keep ab3 stable: eq. (10), less for bent discrete rods and under great tension."""
@@ -323,7 +349,7 @@ class Stepper:
         """All fibers by ab3 in count sub-steps; returns the error estimates (F,)."""
         fibers, h = self.fibers, self._length / count
         times, (velocity, rotation) = self._ambient.polynomial(self._start)
-        error, tension = np.zeros((len(self._state), LANES)), np.zeros((len(self._state), LANES))
+        error, tension = blank(len(self._state)), blank(len(self._state))
         new, old = self._spare
         in_shares(
             ab3.ADVANCE[self.mobility],
@@ -342,7 +368,6 @@ class Stepper:
         self._ages = [h, 2 * h] if count > 1 else [h, *(age + h for age in self._last_ages[:1])]
         self._tensions[:] = tension.reshape(-1)[: fibers.count]
         error = error.reshape(-1)[: fibers.count]
-        self._finite(error)
         self._count(count, error if self.integrator == "ab3" else error[:0])
         self._counts["ab3_steps"] += 1
         return error
@@ -385,7 +410,8 @@ class Stepper:
         self._counts["substeps"] += attempts
 
     def _followed(self, error: np.ndarray, count: int) -> None:
-        """ValueError where ab3 did not follow the motion."""
+        """ValueError where ab3 did not follow the motion, FloatingPointError where it became NaN."""
+        self._finite(error)
         if not error.max() <= LOST:
             raise ValueError(
                 f"ab3 loses fiber {error.argmax()} in step {self._counts['steps']}, from time {self._start:g}: links "

@@ -63,26 +63,21 @@ class TaylorGreen:
         shape = np.shape(positions)
         points = only_read(np.asarray(positions, dtype=float)).reshape(-1, 3)
         wavenumber = np.pi / self.width
-        velocity, slopes = np.empty(points.shape), np.empty((len(points), 2))
-        in_shares(_cellular, COST * len(points), points, wavenumber, self.velocity, velocity, slopes)
-        result, rate = velocity.reshape(shape), self.velocity * wavenumber
-        if one_of("need", need, NEEDS) == "velocity":
-            return result, None
-        sines, cosines = slopes[:, 0].reshape(shape[:-1]), slopes[:, 1].reshape(shape[:-1])
-        if need == "rotation":
-            rotation = np.zeros(shape)
-            np.multiply(rate, sines, out=rotation[..., 2])
-            return result, rotation
-        gradient = np.zeros((*shape, 3))
-        gradient[..., 0, 0], gradient[..., 0, 1] = rate * cosines, -rate * sines
-        gradient[..., 1, 0], gradient[..., 1, 1] = rate * sines, -rate * cosines
-        return result, gradient
+        extra = np.empty((len(points), _COLUMNS[one_of("need", need, NEEDS)]))
+        velocity = np.empty(points.shape)
+        in_shares(_cellular, COST * len(points), points, wavenumber, self.velocity, velocity, extra)
+        tail = (3, 3) if need == "gradient" else (3,)
+        return velocity.reshape(shape), None if need == "velocity" else extra.reshape(*shape[:-1], *tail)
+
+
+_COLUMNS = {"velocity": 0, "rotation": 3, "gradient": 9}
 
 
 @kernel
-def _cellular(share, shares, points, wavenumber, speed, velocity, slopes):
-    """velocity (P, 3) at points (P, 3); slopes (P, 2): sin x̃ sin ỹ and cos x̃ cos ỹ."""
+def _cellular(share, shares, points, wavenumber, speed, velocity, extra):
+    """velocity (P, 3) at points (P, 3), and rotation or gradient, extra (P, 3 or 9); (P, 0) for neither."""
     phase, sine, cosine = np.empty(2 * CHUNK), np.empty(2 * CHUNK), np.empty(2 * CHUNK)
+    rate, columns = speed * wavenumber, extra.shape[1]
     first, last = part_of(share, shares, points.shape[0])
     for start in range(first, last, CHUNK):
         count = min(CHUNK, last - start)
@@ -93,7 +88,13 @@ def _cellular(share, shares, points, wavenumber, speed, velocity, slopes):
             p, j = start + i, count + i
             velocity[p, 0], velocity[p, 1] = speed * sine[i] * cosine[j], -speed * cosine[i] * sine[j]
             velocity[p, 2] = 0.0
-            slopes[p, 0], slopes[p, 1] = sine[i] * sine[j], cosine[i] * cosine[j]
+            turn, stretch = rate * sine[i] * sine[j], rate * cosine[i] * cosine[j]
+            for c in range(columns):
+                extra[p, c] = 0.0
+            if columns == 3:
+                extra[p, 2] = turn
+            elif columns == 9:
+                extra[p, 0], extra[p, 1], extra[p, 3], extra[p, 4] = stretch, -turn, turn, -stretch
 
 
 class ABC:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-CURVATURE_LAWS = ("sine", "discreteRod")
+from ..fiber.model import CURVATURE_LAWS
+from ..sampling import one_of
 
 
 def _checked(positions: ArrayLike, beads: int) -> NDArray[np.float64]:
@@ -66,8 +67,7 @@ def curvature(positions: ArrayLike, radius: float, law: str = "sine") -> NDArray
     θ the angle between the links (Bergou et al. 2008), which does not and is infinite at a fold.
     Raises ValueError for a wrong shape, radius or law.
     """
-    if law not in CURVATURE_LAWS:
-        raise ValueError(f"curvature law is {law!r}; allowed are {', '.join(CURVATURE_LAWS)}")
+    one_of("curvature law", law, CURVATURE_LAWS)
     positions = _checked(positions, 2)
     diameter = 2 * _checked_radius(radius)
     links, lengths = _links(positions)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from gbm_plugin.case import cost as cost_module
-from gbm_plugin.case import verdict
 from gbm_plugin.case.check import notes
 from gbm_plugin.case.cost import cost
 from gbm_plugin.case.expected import expected
@@ -18,7 +17,6 @@ from gbm_plugin.case.new import PRESETS, new_case
 from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.verdict import verdicts
 from gbm_plugin.cli import main
-from gbm_plugin.fiber import stepper
 
 from conftest import gbm, make_case, set_entry
 
@@ -199,7 +197,3 @@ def test_it_takes_a_moment(path, capsys):
     assert main(["info", str(path)]) == 0
     assert "on this machine, idle" in capsys.readouterr().out
     assert 0.05 < cost_module.machine() < 50
-
-
-def test_auto_goes_over_where_the_stepper_does():
-    assert verdict.AFFORDABLE == stepper.AFFORDABLE

@@ -120,6 +120,14 @@ def test_comparisons_keep_the_right_one_beside_a_nan():
         assert (function(nothing, V[0]) == V[0]).all()
 
 
+def test_lanes_lie_in_one_line_of_the_cache():
+    array = simd.blank(3, 5)
+    assert array.shape == (3, 5, LANES)
+    assert array.flags.c_contiguous
+    assert array.ctypes.data % 64 == 0
+    assert not array.any()
+
+
 def test_links_turn_as_rotations_do():
     """Rodrigues' formula: the angle to O(|φ|⁷), the length exactly."""
     link = V / np.linalg.norm(V, axis=0)

@@ -71,6 +71,33 @@ def test_restart_is_bitwise(integrator):
     assert (again.prediction_gap == whole.prediction_gap).all()
 
 
+def test_auto_takes_by_implicit_steps_what_ab3_loses():
+    """Rates that have overflowed: of auto an attempt, which is made again; of ab3 the end, at this step."""
+    fibers = Fibers(bent(11, 7, 0.1), 1e-4, 1.0)
+    with pytest.raises(FloatingPointError, match="fiber 10 has no finite solution in step 5"):
+        _after_an_overflow(fibers, "ab3")
+    found, expected = (_after_an_overflow(fibers, integrator) for integrator in ("auto", "implicit"))
+    assert found.report()["refined_fibers"] == expected.report()["refined_fibers"] == 0
+    assert (found.positions[10] == expected.positions[10]).all()
+    assert np.abs(found.positions - expected.positions).max() < found.tolerance * fibers.contour_length
+    found.restore(found.state())
+    found.advance(0.01)  # with a history of its own, from here on
+    assert found.report()["ab3_steps"] == 6
+    assert np.isfinite(found.positions).all()
+
+
+def _after_an_overflow(fibers: Fibers, integrator: str) -> Stepper:
+    """Four steps by ab3, one with rates of the last fiber that are not finite."""
+    stepper = run_once_per_step(fibers, STILL, 0.01, 4, integrator="ab3")
+    again = Stepper(fibers, integrator=integrator)
+    again.restore(stepper.state())
+    again._rates[0][1, :, 2:] = np.inf  # and its copies, which fill the block
+    again._counts["steps"], again._counts["ab3_steps"] = 4, 4
+    again.advance(0.01)
+    again.observe(again.time, *STILL.sample(again.positions, again.time, again.need))
+    return again
+
+
 @pytest.mark.parametrize("integrator", ["ab3", "implicit"])
 def test_results_do_not_depend_on_the_number_of_threads(integrator):
     """Enough fibers for three shares, whatever this machine has."""
