@@ -46,7 +46,7 @@ def test_any_slabs_give_the_serial_samples(case, serial, ranks, direction):
 
 @pytest.mark.parametrize(("ranks", "direction"), LAYERED)
 def test_transforms_run_on_even_slabs_of_z_and_refuse_others(case, ranks, direction):
-    """The pressure of the default case: FFTW-MPI holds whole layers of z, equally many on each rank."""
+    """The pressure of the pimpleFoam preset: its transforms have whole layers of z, equally many on each rank."""
     path = case(cells=LAYERS, steps=2, application="pimpleFoam", tight=False)
     (path / "constant/fiberProperties").unlink()
     control = path / "system/controlDict"
