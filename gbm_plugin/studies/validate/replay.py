@@ -39,9 +39,9 @@ integrator auto;
 tolerance 1e-6;
 families
 {{
-    stiff {{ count 50; beads 20; length 1.5; bendingStiffness 1e-2; seed 1; }}
-    medium {{ count 50; beads 20; length 1.5; bendingStiffness 1e-3; seed 2; }}
-    soft {{ count 50; beads 20; length 1.5; bendingStiffness 1e-5; seed 3; }}
+    stiff {{ count {count}; beads 20; length 1.5; bendingStiffness 1e-2; seed 1; }}
+    medium {{ count {count}; beads 20; length 1.5; bendingStiffness 1e-3; seed 2; }}
+    soft {{ count {count}; beads 20; length 1.5; bendingStiffness 1e-5; seed 3; }}
 }}
 """
 
@@ -52,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, run, "time_step", "of the run that is stored [s]")
     option(parser, run, "steps", "of that run; a power of two")
     option(parser, run, "development", "least time before it, without fibers [s]")
+    option(parser, run, "fibers", "in each family")
 
 
 def run(
@@ -60,6 +61,7 @@ def run(
     time_step: float = 0.0125,
     steps: int = 256,
     development: float = 10.0,
+    fibers: int = 50,
 ) -> dict:
     """Distances of replays to the coupled run, at its end.
 
@@ -73,7 +75,7 @@ def run(
     if steps < 16 or steps & (steps - 1):
         raise ValueError(f"steps are {steps}; allowed: powers of two from 16 on")
     with tempfile.TemporaryDirectory(prefix="gbm-validate-") as folder:
-        live = _live(Path(case), Path(folder), cells[0], time_step, steps, development)
+        live = _live(Path(case), Path(folder), cells[0], time_step, steps, development, fibers)
         tau = _kolmogorov_time(live)
         size = (live / f"{read_scene(live).end_time:.8g}/U").stat().st_size
         rows = []
@@ -99,7 +101,7 @@ def run(
     }
 
 
-def _live(case: Path, folder: Path, n: int, step: float, steps: int, development: float) -> Path:
+def _live(case: Path, folder: Path, n: int, step: float, steps: int, development: float, count: int) -> Path:
     """A coupled run that wrote every step, continued from a developed flow with all that its solver remembers:
     a first step from a velocity alone is not smooth in time."""
     before, live = folder / "development", folder / "live"
@@ -107,7 +109,7 @@ def _live(case: Path, folder: Path, n: int, step: float, steps: int, development
     start = developed * step
     for copy, begin, end, every, fibers in (
         (before, 0, start, developed, NOBODY),
-        (live, start, start + steps * step, 1, FIBERS.format(steps=steps)),
+        (live, start, start + steps * step, 1, FIBERS.format(steps=steps, count=count)),
     ):
         control = {"deltaT": step, "startTime": begin, "endTime": end}
         control |= {"writeControl": "timeStep", "writeInterval": every}

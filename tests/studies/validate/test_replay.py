@@ -15,7 +15,7 @@ pytestmark = pytest.mark.openfoam
 def test_distance_to_the_coupled_run_by_interval():
     """Every field: the run itself. Every k-th: the mean of the error over the steps between two fields, of which
     those at a field have none, times the second or fourth power of the interval."""
-    result = replay.run(DEFAULT_CASE, [20], 0.05, steps=32, development=1.6)
+    result = replay.run(DEFAULT_CASE, [20], 0.05, steps=32, development=1.6, fibers=15)
     rows = {(row["in_time"], row["every"]): row for row in result["rows"]}
     for in_time, error, power, pairs, slack in (
         ("linear", lambda s: s * (1 - s), 2, [(2, 4), (4, 8)], 0.1),

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.openfoam
 
 
 def test_fibers_converge_to_those_in_the_analytic_flow(second_order):
-    result = steady.run(second_order, [16, 24], 0.025, halvings=2)
+    result = steady.run(second_order, [16, 24], 0.04, halvings=2)
     text = steady.table(result)
     for name in ("stiff_error", "medium_error", "soft_error"):
         assert 1.7 < result["orders"][0][name] < 2.6, f"{name}\n{text}"
