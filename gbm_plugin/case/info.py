@@ -129,13 +129,14 @@ def describe(result: dict) -> str:
 
 def _row(what: str, how: str, why: str, indent: str = "  ") -> list[str]:
     """A thing, in words that may take several lines, and why."""
-    room = WIDTH - 2 - NAMES - WHY
+    head = max(NAMES + 1, len(indent + what))  # a long name takes from the words
+    room = WIDTH - 1 - head - WHY
     parts, reasons = _wrapped(how, room) or [""], _wrapped(why, WHY - 1) or [""]
     rows = max(len(parts), len(reasons))
     parts, reasons = (column + [""] * (rows - len(column)) for column in (parts, reasons))
     names = [f"{indent}{what}", *[""] * (rows - 1)]
     pairs = zip(names, parts, reasons, strict=True)
-    return [f"{name:<{NAMES + 1}} {part:<{room}} {reason}".rstrip() for name, part, reason in pairs]
+    return [f"{name:<{head}} {part:<{room}} {reason}".rstrip() for name, part, reason in pairs]
 
 
 def _takes(cost: dict, disk: dict) -> list[str]:

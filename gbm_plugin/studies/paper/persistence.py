@@ -372,6 +372,6 @@ def draw(result: dict) -> Figure:
     left.set(
         xscale="log", yscale="log", xlabel="L/l$_p$", ylabel="⟨R²⟩/L²", ylim=(0.05, 1.3), xlim=(x[0], x[-1])
     )
-    left.legend(fontsize=8)
+    left.legend(fontsize=7, loc="lower left", labelspacing=0.25)
     right.set(xscale="log", xlabel="L/l$_p$", ylabel="γ of each family", ylim=(0, 10), xlim=(x[0], x[-1]))
     return figure
