@@ -15,9 +15,8 @@ INTEGRATORS = ("ab3", "implicit", "auto")
 MOBILITIES = ("freeDrain", "rpy")
 BENDING_TORQUES = ("consistent", "asPrinted")
 CURVATURE_LAWS = ("sine", "discreteRod")
-AFFORDABLE = (
-    12  # sub-steps of ab3 that cost as much as an implicit step (docs/accuracy.md): so many auto takes,
-)
+# sub-steps of ab3 that cost as much as an implicit step (docs/accuracy.md): so many auto takes,
+AFFORDABLE = 12
 DIVIDED = 4  # times the implicit steps that a flow step is divided into, so many at most
 
 

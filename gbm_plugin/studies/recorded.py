@@ -29,6 +29,7 @@ BLOCK = 16 << 20  # bytes of positions read at once
 Since = (
     float | Sequence[float] | None
 )  # start of the averages [s] of all runs or of each; None: their middles
+TURNING = 1.0  # Kolmogorov times between records that tumbling can be told from
 STIFFER = {"asPrinted": 2.0}  # bending torque: how much stiffer than its K^b it makes a fiber
 
 
@@ -127,9 +128,6 @@ class Family:
             "L_over_l_p": self.stretch if np.isfinite(self.stretch) else None,
             "l_p_over_2a": self.persistence / (2 * self.radius),
         }
-
-
-TURNING = 1.0  # Kolmogorov times between records that tumbling can be told from
 
 
 def even_records(steps: np.ndarray) -> np.ndarray:
