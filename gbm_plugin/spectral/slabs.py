@@ -201,11 +201,12 @@ class _Worker:
 
     def __init__(self, modes: Modes, kind: np.dtype, real: np.dtype):
         n, cut = modes.cells, modes.cut
-        width = n + 64 // kind.itemsize  # rows a power of two apart would fight for the same cache lines
+        width = _odd_lines(n, kind)
         pairs = min(n // 2, max(1, BLOCK // (5 * n * width * kind.itemsize)))
         kept = min(-(-(cut + 1) // 4) * 4, n // 2)  # kz = 0 ... K, and a few more for whole vector registers
         columns = min(2 * cut + 1, max(1, BLOCK // (5 * n * kept * kind.itemsize)))
-        self.columns = pyfftw.zeros_aligned((5, n, columns, kept), kind)
+        room = pyfftw.zeros_aligned((5, n, _odd_lines(columns * kept, kind)), kind)
+        self.columns = room[..., : columns * kept].reshape(5, n, columns, kept)
         self.speed = 0.0
         self.row = np.empty((3, 2 * cut + 2), real)
         self.planes = pyfftw.zeros_aligned((pairs, 5, n, width), kind)
@@ -233,6 +234,12 @@ class _Worker:
     def forward(self, pairs: int, fields: int = 5) -> None:
         for plan in self._for(pairs, fields, "FFTW_FORWARD"):
             plan.execute()
+
+
+def _odd_lines(count: int, kind: np.dtype) -> int:
+    """Room for so many numbers in an odd number of cache lines: rows a power of two apart would fight for the same."""
+    line = 64 // kind.itemsize
+    return (-(-count // line) | 1) * line
 
 
 def _plan(array: np.ndarray, axis: int, direction: str) -> pyfftw.FFTW:
