@@ -11,6 +11,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from . import __version__
@@ -142,6 +143,12 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
     sub = add("info", _info, "Say what a case contains and whether the fiber model holds in it. SI units.")
     add_case(sub)
+    sub.add_argument(
+        "--flow",
+        choices=("openfoam", "spectral"),
+        default="openfoam",
+        help="as of gbm run (default: openfoam)",
+    )
     _add_json(sub)
     sub = add("study", _study, "Measure and compare; without a name, the list of studies.")
     if words[:1] == ["study"]:
@@ -246,6 +253,11 @@ def _info(arguments) -> dict:
     from .case.scene import read_scene
 
     scene = read_scene(arguments.case)
+    if arguments.flow == "spectral":
+        from .run.spectral import check_spectral
+
+        check_spectral(scene)
+        scene = replace(scene, application=arguments.flow)
     result = figures(scene)
     print(describe(result))
     result["notes"] = [*notes(scene, judged=False), *filter(None, [difference(scene.case)])]

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import CaseError
 from .dictionary import Dictionary
 from .expected import expected
-from .layout import processors, velocity_file
+from .layout import SPECTRAL, processors, velocity_file
 from .scene import Scene
 from .syntax import SyntaxFault, parse, tokens
 from .verdict import WRONG, verdicts
@@ -182,7 +182,9 @@ def notes(scene: Scene, judged: bool = True) -> list[str]:
         if judged and v.grade == WRONG and v.name not in ("dx/eta", "L/box")
     ]
     writes = (scene.end_time - scene.start_time) / scene.write_interval
-    if abs(writes - round(writes)) > 1e-3:  # also with an interval beyond the end
+    if (
+        scene.application != SPECTRAL and abs(writes - round(writes)) > 1e-3
+    ):  # also with an interval beyond the end
         found.append(
             f"OpenFOAM writes every {scene.write_interval:g} s and not at endTime {scene.end_time:g}: the same command "
             "will repeat what follows the last time that is written"
@@ -191,7 +193,7 @@ def notes(scene: Scene, judged: bool = True) -> list[str]:
         found.append(
             f"statistics begin at {scene.statistics.since:g} s, after endTime {scene.end_time:g}: none are gathered"
         )
-    model = _turbulence_model(scene.case)
+    model = None if scene.application == SPECTRAL else _turbulence_model(scene.case)
     if model not in ("laminar", None):
         found.append(
             f"constant/turbulenceProperties: simulationType {model}: fibers feel the resolved flow alone, and its "

@@ -16,44 +16,70 @@ import numpy as np
 from ..fiber.model import AFFORDABLE
 from .dictionary import Dictionary
 from .disk import needed, writes
+from .layout import SPECTRAL
+from .plan import SAMPLE, need
 from .scene import Family, Scene
+from .solver import sub_cycles
 from .verdict import sub_steps
 
 # the task by which machines are compared, and its time where these were measured [s of one core]
 TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 15
 
-BOX_FOAM = 3.0e-9  # a step, for each cell and log2(cells) [s]
+# a step of a flow [s]: its log and its tables, and for each cell
+STEP = 0.4e-3
+BOX_FOAM = 3.0e-9  # times log2(cells)
 OUTER, PRESSURE = (
     1.6e-6,
     0.25e-6,
-)  # of pimpleFoam and pisoFoam: an outer corrector, and each pressure equation in it
-STEP = 0.4e-3  # beside the cells, in every step of a solver: its log, its tables
-SAMPLE = {"trilinear": 0.1e-6, "cubic": 0.2e-6, "quintic": 0.4e-6}  # a bead; other words, OpenFOAM's own:
-SAMPLE_OTHER = 1.0e-6
-CACHE, MISSED = (
-    24e6,
-    {"trilinear": 1e-6, "cubic": 2e-6, "quintic": 6e-6},
-)  # bytes of U, beyond which a bead takes more
-EXCHANGE, BEAD = 0.3e-3, 0.1e-6  # of a step: to find and send beads
-DAEMON, TAKEN = 0.8e-3, 46e-9  # a step of the daemon, and what it does with each bead beside moving it
-MOVED = {  # a bead in one step of an integrator: c_0 + c_1 N + c_2 N^2, N beads in its fiber [s]
-    ("ab3", "freeDrain"): (22e-9, 0, 0),
-    ("implicit", "freeDrain"): (140e-9, 0, 0),
-    ("ab3", "rpy"): (60e-9, 16e-9, 0.8e-9),
-    ("implicit", "rpy"): (213e-9, 13e-9, 22e-9),
+)  # of pimpleFoam and pisoFoam: an outer corrector, each pressure equation in it
+MODES, FIELD = (
+    1.8e-9,
+    0.45e-9,
+)  # of the spectral solver, times log2(nodes): a step; a field at the nodes to sample
+RUNGE_KUTTA = 6  # right-hand sides more, in the first steps of the spectral solver
+
+# velocity and rotation at a bead [s], by the interpolation
+AT_CELLS = {"trilinear": 0.1e-6, "cubic": 0.2e-6, "quintic": 0.4e-6}  # of our own; and of OpenFOAM's own:
+AT_CELLS_OTHER = 1.0e-6
+AT_NODES = {"trilinear": 0.2e-6, "cubic": 1.0e-6, "quintic": 2.0e-6}  # and, a mode, of the sum of them:
+AT_NODES_EXACT = 0.7e-9
+# bytes of the fields, beyond which they are not in the cache, and a bead takes more
+CACHE, MISSED = 24e6, {"trilinear": 1e-6, "cubic": 2e-6, "quintic": 6e-6}
+
+# a step of the fibers [s]: of the coupling, to find and send beads; of who moves them, beside moving
+EXCHANGE, BEAD = 0.3e-3, 0.1e-6
+DAEMON, FAMILY, TAKEN = 0.7e-3, 0.1e-3, 46e-9
+LANES = 8  # fibers that are moved at once
+# a bead in one step of an integrator [s]: by itself, with each other bead of its fiber, and its part of the
+# elimination, N^2 of a dense system of N beads; beyond the cache the elimination waits for its matrix
+MOVED = {
+    ("ab3", "freeDrain"): (30e-9, 0, 0),
+    ("implicit", "freeDrain"): (150e-9, 0, 0),
+    ("ab3", "rpy"): (30e-9, 12e-9, 0.4e-9),
+    ("implicit", "rpy"): (150e-9, 12e-9, 9e-9),
 }
+WAITS = 3.0
 ATTEMPTS = 1.5  # steps of implicit and auto in a step of the flow, of all fibers in the mean
-START, PREPARED = 3.5, 2e-6  # programs, kernels; initial field and mesh, for each cell [s]
+
+START, START_ALONE, PREPARED = (
+    3.5,
+    2.5,
+    2e-6,
+)  # programs and kernels, of two sides and of one; initial field, a cell
 DISK, RECORD = 200e6, 2e-3  # bytes a second into time folders; seconds of a record
-PROGRAMS = 380e6  # bytes of solver, daemon and `gbm run` without cells and beads
-CELL, CELL_OTHER, BEAD_MEMORY = 900, 1500, 4000  # bytes, at their highest: boxFoam, other solvers, the daemon
+
+# bytes at their highest: of programs without cells and beads, a cell, a bead, and N^2 of a fiber of N beads with rpy
+PROGRAMS, PROGRAM = 380e6, 250e6
+CELL = {"boxFoam": 900, SPECTRAL: 120}
+CELL_OTHER, BEAD_MEMORY = 1500, 4000
+MATRICES = {"ab3": 64 * 26, "implicit": 64 * 44}  # in every thread, of every family
 
 
 @dataclass(frozen=True)
 class Cost:
     """Seconds of a run from startTime on an idle machine, on one rank: the parts, of which `fibers` and `coupling` are
-    what the flow does not hide; None where nothing was measured. solver: processor time of the solver, which moves
-    no fibers but samples for them, hidden or not. memory [bytes] of solver and daemons."""
+    what the flow does not hide; None where nothing was measured. solver, daemon: processor time of the two sides,
+    hidden or not: of the flow and its samples, and of the fibers. memory [bytes] of all."""
 
     start: float
     flow: float | None
@@ -62,6 +88,7 @@ class Cost:
     writing: float
     total: float | None
     solver: float | None
+    daemon: float
     memory: float
 
 
@@ -70,27 +97,29 @@ def cost(scene: Scene, slower: float | None = None) -> Cost:
     slower = machine() if slower is None else slower
     steps = round(max(0.0, scene.end_time - scene.start_time) / scene.time_step)
     cells, beads = math.prod(scene.cells or (0,)), sum(f.count * f.beads for f in scene.families)
-    step = _flow_step(scene, cells)
-    cores = len(os.sched_getaffinity(0))
-    daemon = DAEMON + TAKEN * beads + sum(map(_moved, scene.families, [scene] * len(scene.families)))
-    sampling = EXCHANGE + beads * (BEAD + _sampled(scene, cells))
-    # a thread of boxFoam samples while the next step is computed, and the daemon goes on when it has
-    beside = scene.application == "boxFoam" and not scene.coupling.feedback and scene.interpolation in SAMPLE
-    room = step or 0.0 if cores > 1 else 0.0
-    sampled = min(sampling, room) if beside else 0.0
-    hidden = min(daemon, room - sampled)
+    flow = _flow(scene, cells, steps)
+    step = None if flow is None else flow / max(steps, 1)
+    daemon = DAEMON + TAKEN * beads + sum(FAMILY + _moved(f, scene) for f in scene.families)
+    sampling = _sampled(scene, cells, beads)
+    hidden, sampled = _hidden(scene, step or 0.0, daemon, sampling)
+    alone = scene.application == SPECTRAL
     disk = needed(scene)
     parts = {
-        "start": slower * (START + PREPARED * cells),
-        "flow": None if step is None else slower * steps * step,
+        "start": slower * ((START_ALONE if alone else START) + PREPARED * cells),
+        "flow": None if flow is None else slower * flow,
         "fibers": slower * steps * (daemon - hidden),
         "coupling": slower * steps * (sampling - sampled),
         "writing": writes(scene) * disk["time_folder"] / DISK + RECORD * steps / scene.record_interval,
     }
-    total = None if step is None else sum(value for value in parts.values() if value is not None)
-    each = CELL if scene.application == "boxFoam" else CELL_OTHER
-    solver = None if step is None else slower * steps * (step + sampling)
-    return Cost(**parts, total=total, solver=solver, memory=PROGRAMS + each * cells + BEAD_MEMORY * beads)
+    total = None if flow is None else sum(value for value in parts.values() if value is not None)
+    solver = None if flow is None else slower * (flow + steps * sampling)
+    return Cost(
+        **parts,
+        total=total,
+        solver=solver,
+        daemon=slower * steps * daemon,
+        memory=_memory(scene, cells, beads),
+    )
 
 
 def machine() -> float:
@@ -104,31 +133,71 @@ def machine() -> float:
     return best / TASK_TIME
 
 
-def _flow_step(scene: Scene, cells: int) -> float | None:
-    """A step of the solver on one core [s]; None of one that was not measured."""
+def _flow(scene: Scene, cells: int, steps: int) -> float | None:
+    """So many steps of the solver on one core [s]; None of one that was not measured."""
     if not cells:
         return None
+    if scene.application == SPECTRAL:
+        rates = steps * sub_cycles(scene.case) + RUNGE_KUTTA
+        return STEP * steps + MODES * cells * math.log2(cells) * rates
     if scene.application == "boxFoam":
-        return STEP + BOX_FOAM * cells * math.log2(cells)
+        return steps * (STEP + BOX_FOAM * cells * math.log2(cells))
     if scene.application not in ("pimpleFoam", "pisoFoam"):
         return None
     name = "PIMPLE" if scene.application == "pimpleFoam" else "PISO"
     solution = Dictionary.read(scene.case, "system/fvSolution").sub(name, {})
     outer = solution.integer("nOuterCorrectors", 1, least=1) if name == "PIMPLE" else 1
     inner = solution.integer("nCorrectors", 1, least=1)
-    return STEP + cells * outer * (OUTER + inner * PRESSURE)
+    return steps * (STEP + cells * outer * (OUTER + inner * PRESSURE))
 
 
-def _sampled(scene: Scene, cells: int) -> float:
-    """The flow at a bead [s]."""
-    missed = MISSED.get(scene.interpolation, 0.0) if 24 * cells > CACHE else 0.0
-    return SAMPLE.get(scene.interpolation, SAMPLE_OTHER) + missed
+def _sampled(scene: Scene, cells: int, beads: int) -> float:
+    """The flow at all beads [s], in a step."""
+    word = scene.interpolation
+    missed = MISSED.get(word, 0.0)
+    if scene.application != SPECTRAL:
+        bead = AT_CELLS.get(word, AT_CELLS_OTHER) + (missed if 24 * cells > CACHE else 0.0)
+        return EXCHANGE + beads * (BEAD + bead)
+    numbers = SAMPLE[need(scene)]
+    part = numbers / SAMPLE["rotation"]
+    if word == "exact":
+        return part * beads * AT_NODES_EXACT * 4 / 27 * cells
+    bead = AT_NODES.get(word, 0.0) + (missed if 8 * numbers * cells > CACHE else 0.0)
+    return numbers * FIELD * cells * math.log2(cells) + part * beads * bead
+
+
+def _hidden(scene: Scene, step: float, daemon: float, sampling: float) -> tuple[float, float]:
+    """How much of the fibers and of the coupling [s] goes on beside a step of the flow."""
+    if scene.application == SPECTRAL or len(os.sched_getaffinity(0)) == 1:
+        return 0.0, 0.0
+    # a thread of boxFoam samples while the next step is computed, and the daemon goes on when it has
+    beside = (
+        scene.application == "boxFoam" and not scene.coupling.feedback and scene.interpolation in AT_CELLS
+    )
+    sampled = min(sampling, step) if beside else 0.0
+    return min(daemon, step - sampled), sampled
 
 
 def _moved(f: Family, scene: Scene) -> float:
     """A family in a step of the flow [s], on one core."""
     count = sub_steps(f, scene)
     explicit = f.model.integrator == "ab3" or (f.model.integrator == "auto" and count <= AFFORDABLE)
-    c = MOVED["ab3" if explicit else "implicit", f.model.mobility]
+    bead, other, elimination = MOVED["ab3" if explicit else "implicit", f.model.mobility]
+    if _matrices(f) > CACHE / LANES:
+        elimination *= WAITS
+    fibers = LANES * math.ceil(f.count / LANES)
     times = count if explicit else ATTEMPTS
-    return f.count * f.beads * times * (c[0] + c[1] * f.beads + c[2] * f.beads**2)
+    return fibers * f.beads * times * (bead + other * f.beads + elimination * f.beads**2)
+
+
+def _matrices(f: Family) -> float:
+    """Bytes of the dense systems of eight fibers, with rpy."""
+    size = MATRICES["ab3" if f.model.integrator == "ab3" else "implicit"] * f.beads**2
+    return size if f.model.mobility == "rpy" else 0.0
+
+
+def _memory(scene: Scene, cells: int, beads: int) -> float:
+    programs = PROGRAM if scene.application == SPECTRAL else PROGRAMS
+    matrices = len(os.sched_getaffinity(0)) * sum(map(_matrices, scene.families))
+    cell = CELL.get(scene.application, CELL_OTHER)
+    return programs + cell * cells + BEAD_MEMORY * beads + matrices

@@ -7,6 +7,7 @@ import math
 import shutil
 
 from .dictionary import Dictionary
+from .layout import SPECTRAL
 from .log import MOST
 from .scene import Scene
 
@@ -16,6 +17,8 @@ log = logging.getLogger(__name__)
 VELOCITY, NEWEST, OLDER = 3, 7, 6
 REMEMBER = ("backward", "CrankNicolson", "localEuler")
 MODES = 9  # numbers for each cell in uniform/boxFoam, in binary: of the velocity and of two earlier rates
+# bytes for each cell of a spectral run: U in binary; the modes that are kept, of it and of three slopes
+SPECTRAL_CELL = 24 + 4 * 48 * 4 / 27
 BINARY, SIGNS = 8, 6  # bytes of a number in binary; sign, point, exponent and a space beside its digits
 STATE, CLOUD, RECORD = 290, 110, 24  # bytes for each bead: fibers.npz, the cloud beside the fields, a record
 TABLES = 600  # bytes of a step in all tables of postProcessing
@@ -56,6 +59,8 @@ def kept_folders(control: Dictionary) -> int:
 
 
 def _cell_bytes(scene: Scene, control: Dictionary) -> float:
+    if scene.application == SPECTRAL:
+        return SPECTRAL_CELL
     own = scene.application == "boxFoam"
     numbers = VELOCITY if own and not control.switch("writePressure", True) else NEWEST
     if not own and (scene.case / "system/fvSchemes").is_file():

@@ -10,7 +10,7 @@ from .share import WHOLE, Share, shared_files
 
 STATE_FILE = "uniform/fibers.npz"  # of a single daemon; of several: fibers.<number>of<daemons>.npz
 FLOW_FILE = "uniform/flow.npz"  # the spectral solver's own, in a time folder of SPECTRAL
-SPECTRAL = "spectral"  # the folder of its results in a case
+SPECTRAL = "spectral"  # the solver in place of `application`, and the folder of its results in a case
 PREVIOUS = "previous"
 RESULTS = "postProcessing"
 FIBERS = "fibers"  # a folder there

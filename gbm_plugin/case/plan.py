@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from ..fiber.model import AFFORDABLE
 from .dictionary import Dictionary
 from .disk import readable, writes
+from .layout import SPECTRAL
 from .scene import Family, Scene
-from .solver import scheme
+from .solver import asked_by, scheme
 from .verdict import sub_steps
 
 FIBERS = "constant/fiberProperties"
@@ -34,7 +35,7 @@ def need(scene: Scene) -> str:
 def computed(scene: Scene) -> list[Item]:
     """The flow, its forcing, every family, and what is sampled for them."""
     chosen = _Choices(scene)
-    items = [Item("flow", scheme(scene), f"application {scene.application}")]
+    items = [Item("flow", scheme(scene), asked_by(scene))]
     if scene.forcing:
         values = " ".join(
             f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in scene.forcing.values.items()
@@ -70,6 +71,8 @@ def left_out(scene: Scene) -> list[str]:
 
 def exchanged(scene: Scene) -> Item:
     """Bytes of a step between solver and daemons."""
+    if scene.application == SPECTRAL:
+        return Item("exchanges", "nothing: flow and fibers are one process", asked_by(scene))
     beads = sum(f.count * f.beads for f in scene.families)
     out, back = (72 if scene.coupling.feedback else 24) * beads, 8 * SAMPLE[need(scene)] * beads
     daemons = f"{scene.coupling.daemons} daemons" if scene.coupling.daemons > 1 else "1 daemon"
@@ -83,7 +86,9 @@ def stored(scene: Scene) -> list[Item]:
     fields = "U, p, phi,"
     if scene.application == "boxFoam" and not control.switch("writePressure", True):
         fields = "U,"
-    state = "flow and fibers" if scene.application == "boxFoam" else "fibers"
+    if scene.application == SPECTRAL:
+        fields = f"{SPECTRAL}/<time>: U,"
+    state = "flow and fibers" if scene.application in ("boxFoam", SPECTRAL) else "fibers"
     steps = round((scene.end_time - scene.start_time) / scene.time_step)
     items = [Item("stores", f"{fields} states of {state} {writes(scene)} times", "writeInterval")]
     if scene.statistics:

@@ -1,4 +1,4 @@
-"""What the choice of a solver means: the word `application` of system/controlDict."""
+"""What the choice of a solver means: `application` of system/controlDict, or the spectral solver in its place."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import re
 from pathlib import Path
 
 from .dictionary import Dictionary
+from .layout import SPECTRAL
 from .scene import Scene
+
+# of the spectral solver: the Courant number of a step of its flow; how much it keeps of the wavenumbers of its nodes
+SPECTRAL_COURANT, TRUNCATED = 0.34, 2 / 3
 
 # words of boxSchemes: order in space, and the Courant number sum |u_d| dt/h_d up to which AB3 is stable with them
 DIFFERENCES = {"central2": ("second", 0.72), "central4": ("fourth", 0.53), "central6": ("sixth", 0.46)}
@@ -19,13 +23,37 @@ def scheme(scene: Scene) -> str:
     if scene.application == "boxFoam":
         order, _ = DIFFERENCES[_differences(scene.case)]
         return f"{order} order in space, third in time"
+    if scene.application == SPECTRAL:
+        cycles = sub_cycles(scene.case)
+        return "pseudo-spectral, 2/3 of the modes, third order in time" + f", {cycles} steps in one" * (
+            cycles > 1
+        )
     text = "finite volumes, by fvSchemes and fvSolution"
     return f"{text}; boxFoam solves this box far faster" if scene.box and scene.cells else text
 
 
 def stable_courant(scene: Scene) -> float | None:
     """The Courant number sum |u_d| dt/h_d up to which the solver is stable; None where it is implicit."""
+    if scene.application == SPECTRAL:
+        return SPECTRAL_COURANT * sub_cycles(scene.case)
     return DIFFERENCES[_differences(scene.case)][1] if scene.application == "boxFoam" else None
+
+
+def asked_by(scene: Scene) -> str:
+    """Where the solver is chosen."""
+    return f"--flow {SPECTRAL}" if scene.application == SPECTRAL else f"application {scene.application}"
+
+
+def sub_cycles(case: Path) -> int:
+    """Steps of the spectral flow in one deltaT, of the fibers and of the coupling: fvSolution, spectral { nSubCycles
+    n; }."""
+    solution = Dictionary.read(case, "system/fvSolution") if (case / "system/fvSolution").is_file() else None
+    if solution is None or SPECTRAL not in solution:
+        return 1
+    d = solution.sub(SPECTRAL)
+    cycles = d.integer("nSubCycles", 1, least=1)
+    d.done()
+    return cycles
 
 
 def second_difference(case: Path) -> tuple[float, ...]:

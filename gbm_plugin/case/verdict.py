@@ -10,8 +10,9 @@ from ..scales import coupling_error, coupling_step
 from .beads import bead_error, enough_beads
 from .expected import Expected
 from .feedback import NEGLIGIBLE, STABLE, TOO_LARGE, cell_size, exchange_step, own_ratio, removes_own
+from .layout import SPECTRAL
 from .scene import Family, Scene
-from .solver import stable_courant
+from .solver import TRUNCATED, stable_courant
 
 GOOD, DOUBTFUL, WRONG = "good", "doubtful", "wrong"
 
@@ -104,9 +105,11 @@ def _of_the_flow(scene: Scene, flow: Expected) -> list[Verdict]:
     if scene.box and scene.cells:
         width, length, number = max((b / n, b, n) for b, n in zip(scene.box, scene.cells, strict=True))
         if eta:
-            enough = math.ceil(length / (CELLS[0] * eta))
+            resolved = TRUNCATED if scene.application == SPECTRAL else 1.0
+            cells = tuple(c * resolved for c in CELLS)
+            enough = math.ceil(length / (cells[0] * eta))
             change = f"n {enough + enough % 2} (blockMeshDict; now {number})"
-            found.append(_graded("dx/eta", width / eta, CELLS, f"up to {CELLS[0]:g} (k_max eta 1.5)", change))
+            found.append(_graded("dx/eta", width / eta, cells, f"up to {cells[0]:g} (k_max eta 1.5)", change))
         if flow.speed:
             limit = stable_courant(scene)
             narrow = min(b / n for b, n in zip(scene.box, scene.cells, strict=True))

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import check_arrays, read_arrays
-from ..case.dictionary import Dictionary
 from ..case.initial import read_initial_field
 from ..case.layout import FLOW_FILE, SPECTRAL, flow_table, results
 from ..case.scene import Forcing, Scene
+from ..case.solver import sub_cycles
 from ..case.times import choose_start
 from ..errors import CaseError, StateError
 from ..fiber import Reaction
@@ -45,12 +45,7 @@ def run_spectral(
 
     Raises CaseError for what this engine cannot do, FloatingPointError where the flow or a fiber is not finite.
     """
-    cells, box = _cube(scene)
-    if scene.interpolation not in WORDS:
-        raise CaseError(
-            f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of the "
-            f"spectral solver's; allowed: {' '.join(WORDS)}"
-        )
+    cells, box, cycles = check_spectral(scene)
     folder = results_folder(scene.case, SPECTRAL)
     start = choose_start(
         folder, scene.start_time, scene.end_time, scene.time_step, fresh, makes_beginning=True
@@ -58,12 +53,6 @@ def run_spectral(
     if start.complete:
         log.info(COMPLETE, start.time)
         return True
-    cycles = _sub_cycles(scene.case)
-    if scene.coupling.feedback and cycles > 1:
-        raise CaseError(
-            f"{scene.case}/system/fvSolution: nSubCycles is {cycles}: with feedback the flow and its fibers take the "
-            "same steps, and it must be 1"
-        )
     solver = SpectralSolver(
         cells,
         scene.kinematic_viscosity,
@@ -77,7 +66,7 @@ def run_spectral(
     )
     if not start.continues:
         _set_initial(scene, solver)
-    scene = replace(scene, case=folder)
+    scene = replace(scene, case=folder, application=SPECTRAL)
     return Run(scene, _SpectralFlow(scene, solver, cycles), start).to_the_end()
 
 
@@ -97,15 +86,22 @@ def _set_initial(scene: Scene, solver: SpectralSolver) -> None:
         raise CaseError(f"{scene.case}/system/initialFieldDict: {error}") from None
 
 
-def _sub_cycles(case: Path) -> int:
-    """Steps of the flow in one deltaT, of the fibers and of the coupling: fvSolution, spectral { nSubCycles n; }."""
-    solution = Dictionary.read(case, "system/fvSolution") if (case / "system/fvSolution").is_file() else None
-    if solution is None or "spectral" not in solution:
-        return 1
-    d = solution.sub("spectral")
-    cycles = d.integer("nSubCycles", 1, least=1)
-    d.done()
-    return cycles
+def check_spectral(scene: Scene) -> tuple[int, float, int]:
+    """Cells in a direction, edge of the box [m], and steps of the flow in one of the fibers. CaseError for what this
+    engine cannot do."""
+    cells, box = _cube(scene)
+    if scene.interpolation not in WORDS:
+        raise CaseError(
+            f"{scene.case}/constant/fiberProperties: interpolation '{scene.interpolation}' is not one of the "
+            f"spectral solver's; allowed: {' '.join(WORDS)}"
+        )
+    cycles = sub_cycles(scene.case)
+    if scene.coupling.feedback and cycles > 1:
+        raise CaseError(
+            f"{scene.case}/system/fvSolution: nSubCycles is {cycles}: with feedback the flow and its fibers take the "
+            "same steps, and it must be 1"
+        )
+    return cells, box, cycles
 
 
 def _cube(scene: Scene) -> tuple[int, float]:

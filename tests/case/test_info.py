@@ -13,10 +13,16 @@ from gbm_plugin.case.check import notes
 from gbm_plugin.case.cost import cost
 from gbm_plugin.case.expected import expected
 from gbm_plugin.case.info import describe, figures
+from gbm_plugin.case.layout import SPECTRAL
 from gbm_plugin.case.new import PRESETS, new_case
 from gbm_plugin.case.scene import read_scene
+from gbm_plugin.case.solver import SPECTRAL_COURANT, TRUNCATED
 from gbm_plugin.case.verdict import verdicts
 from gbm_plugin.cli import main
+from gbm_plugin.fiber import ab3, implicit
+from gbm_plugin.fiber.simd import LANES
+from gbm_plugin.spectral.modes import Modes
+from gbm_plugin.spectral.solver import STABLE
 
 from conftest import gbm, make_case, set_entry
 
@@ -189,6 +195,65 @@ def test_the_estimate_follows_the_work(path, monkeypatch):
         cost(replace(scene, families=(f,), end_time=4.0), slower=1.0).fibers for f in (stiff, softer)
     )
     assert hard == pytest.approx(2 * half, rel=0.01)
+
+
+def test_the_other_engine(path):
+    """One process, which hides nothing; k_max is 2/3 of that of the nodes, AB3 is stable to 0.34."""
+    set_entry(path / "constant/fiberProperties", "interpolation", "cubic")
+    own = replace(read_scene(path), end_time=4.0, write_interval=np.inf)
+    scene = replace(own, application=SPECTRAL)
+    assert STABLE["ab3"] == SPECTRAL_COURANT
+    assert pytest.approx(2 * Modes(600, 1.0).cut / 600, rel=1e-2) == TRUNCATED
+    once, twice = (cost(replace(scene, end_time=t), slower=1.0) for t in (4.0, 8.0))
+    assert once.total == pytest.approx(once.solver + once.daemon + once.start + once.writing)
+    assert twice.fibers == pytest.approx(2 * once.fibers) and twice.coupling == pytest.approx(
+        2 * once.coupling
+    )
+    start = 6 * cost_module.MODES * 128**3 * np.log2(128**3)  # two steps of four right-hand sides
+    assert 2 * once.flow - twice.flow == pytest.approx(start)
+    larger = cost(replace(scene, cells=(256,) * 3), slower=1.0)
+    assert larger.flow == pytest.approx(8 * once.flow * np.log(256) / np.log(128), rel=0.05)
+    result = figures(scene)
+    assert (
+        result["exchanges"]["how"].startswith("nothing") and "spectral/<time>" in result["stores"][0]["how"]
+    )
+    assert max(map(len, describe(result).splitlines())) <= 80
+    found = {v["name"]: v for v in result["verdicts"]}
+    fine = judged(path, application=SPECTRAL, cells=(128,) * 3)["dx/eta"]  # good for boxFoam
+    cells = int(fine.change.split()[1])
+    assert fine.grade == "doubtful" and cells == pytest.approx(128 * fine.value / (2 * np.pi / 4.5), abs=2)
+    assert "0.34" in found["Courant"]["asked"]
+
+
+def test_the_other_engine_by_the_command(path):
+    set_entry(path / "constant/fiberProperties", "interpolation", "cubic")
+    done = gbm("info", path, "--flow", "spectral")
+    assert done.returncode == 0 and "--flow spectral" in done.stdout, done.stderr
+    assert done.stdout.count("pseudo-spectral") == 1
+    set_entry(path / "constant/fiberProperties", "interpolation", "cellPoint")
+    done = gbm("info", path, "--flow", "spectral")
+    assert done.returncode == 1 and "allowed: trilinear cubic quintic exact" in done.stderr
+
+
+@pytest.mark.parametrize("integrator, module", [("ab3", ab3), ("implicit", implicit)])
+def test_what_hydrodynamic_interactions_take(path, integrator, module):
+    """N^3 a fiber, and eight at once; memory of the kernels' own scratch, to a tenth."""
+    scene = read_scene(path)
+    model = replace(scene.families[0].model, integrator=integrator)
+    fibers = replace(scene.families[0], beads=500, count=8, bending_stiffness=0.0, model=model)
+
+    def taken(**changes):
+        family = replace(fibers, **changes)
+        return cost(replace(scene, families=(family,)), slower=1.0)
+
+    drained, coupled = (taken(model=replace(model, mobility=word)) for word in ("freeDrain", "rpy"))
+    rows = module.scratch_rows("rpy", 500) - module.scratch_rows("freeDrain", 500)
+    cores = len(cost_module.os.sched_getaffinity(0))
+    assert coupled.memory - drained.memory == pytest.approx(cores * rows * LANES * 8, rel=0.1)
+    fibers = replace(fibers, model=replace(model, mobility="rpy"))
+    assert taken(count=1).daemon == pytest.approx(coupled.daemon, rel=1e-3)
+    assert taken(count=9).daemon == pytest.approx(2 * coupled.daemon, rel=1e-3)
+    assert taken(beads=1000).daemon == pytest.approx(8 * coupled.daemon, rel=0.1)
 
 
 def test_it_takes_a_moment(path, capsys):

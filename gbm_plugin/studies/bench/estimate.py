@@ -1,73 +1,127 @@
-"""The time that `gbm info` estimates beside the time that a run takes, preset by preset.
+"""The time that `gbm info` estimates beside the time that a run takes: presets, both engines, both mobilities.
 
-Each preset is cut to a few seconds of its flow and run by OpenFOAM. `processor` is the time of the solver, which
-samples for the fibers too: the estimate of flow and coupling. `wall` is that of all, the estimate of an idle machine:
-on one that others use it is longer.
+Each preset is cut to a few seconds of its flow and run. Times are processor time of a step: of the flow, with what it
+samples for the fibers (of OpenFOAM, by its log; of the spectral solver with its fibers, all one process), and of the
+daemon, between a sample and the next positions (lower quartile, with OpenFOAM alone). `wall` is that of the whole run,
+the estimate of an idle machine: on one that others use it is longer. Transforms before and after each run tell how fast
+the machine is at that time.
 """
 
 from __future__ import annotations
 
 import argparse
+import logging
+import math
+import os
 import re
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
+
+import numpy as np
 
 from ...case.cost import cost, machine
 from ...case.edit import set_entries
+from ...case.layout import SPECTRAL, daemon_table, log_file, results
 from ...case.new import PRESETS, new_case
-from ...case.scene import read_scene
-from ...errors import RunError
+from ...case.scene import Scene, read_scene
+from ...fiber.model import MOBILITIES
+from ...output.tables import read_dat
+from ...run import openfoam
+from ...threads import limited_to
 from ..study import option
 from ..study import steps as progress
 
 DEFAULT = ("default", "quick", "pimpleFoam", "flow-I", "taylor-green")
+FLOWS = ("openfoam", SPECTRAL)
 LEAST = 10  # steps
+START = 5  # steps that are corrected
+UNDISTURBED = 0.25  # of the steps of the daemon, which has no clock but that of the wall
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, run, "presets", "which", nargs="+", choices=list(PRESETS), metavar="NAME")
-    option(parser, run, "seconds", "of the flow in each, estimated")
+    option(parser, run, "flows", "of gbm run --flow", nargs="+", choices=FLOWS, metavar="FLOW")
+    option(parser, run, "mobilities", "of all fibers", nargs="+", choices=MOBILITIES, metavar="WORD")
+    option(parser, run, "seconds", "of the flow and its fibers in each, estimated")
 
 
-def run(presets: Sequence[str] = DEFAULT, seconds: float = 10.0) -> dict:
+def run(
+    presets: Sequence[str] = DEFAULT,
+    flows: Sequence[str] = FLOWS,
+    mobilities: Sequence[str] = MOBILITIES,
+    seconds: float = 4.0,
+) -> dict:
     """Seconds, estimated and taken. Raises RunError where a run fails."""
-    found = []
+    found, cases = [], list(product(presets, flows, mobilities))
     with tempfile.TemporaryDirectory(prefix="gbm-estimate-") as folder:
-        for preset in progress(presets, len(presets), "presets"):
-            case = new_case(Path(folder) / preset, preset)
-            slower = machine()
-            scene = read_scene(case)
-            whole = cost(scene, slower)
-            steps = round((scene.end_time - scene.start_time) / scene.time_step)
-            cut = min(steps, max(LEAST, round(steps * seconds / whole.flow)))
-            set_entries(case / "system/controlDict", {"endTime": scene.start_time + cut * scene.time_step})
-            set_entries(case / "system/controlDict", {"writeInterval": cut})
-            found.append(_measured(case, slower) | {"preset": preset, "steps": cut, "slower": slower})
+        for preset, flow, mobility in progress(cases, len(cases), "runs"):
+            case = new_case(Path(folder) / f"{preset}-{flow}-{mobility}", preset)
+            set_entries(case / "constant/fiberProperties", {"mobility": mobility})
+            count = _cut(case, flow, machine(), seconds)
+            row = {"preset": preset, "flow": flow, "mobility": mobility, "steps": count}
+            found.append(row | _measured(case, flow, count))
     return {"runs": found}
 
 
-def _measured(case: Path, slower: float) -> dict[str, float]:
-    estimate = cost(read_scene(case), slower)
-    start = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-m", "gbm_plugin.cli", "run", str(case)], capture_output=True, text=True
+def _scene(case: Path, flow: str) -> Scene:
+    scene = read_scene(case)
+    return replace(scene, application=SPECTRAL) if flow == SPECTRAL else scene
+
+
+def _cut(case: Path, flow: str, slower: float, seconds: float) -> int:
+    """The case ends after so many steps as take `seconds`."""
+    scene = _scene(case, flow)
+    whole = cost(scene, slower)
+    steps = round((scene.end_time - scene.start_time) / scene.time_step)
+    count = min(steps, max(LEAST, round(steps * seconds / (whole.solver + whole.daemon))))
+    times = {"endTime": scene.start_time + count * scene.time_step, "writeInterval": count}
+    set_entries(case / "system/controlDict", times)
+    return count
+
+
+def _measured(case: Path, flow: str, count: int) -> dict[str, float]:
+    before = machine()
+    begin, own = time.perf_counter(), time.process_time()
+    with _quiet_and_alone():
+        openfoam.run(case) if flow != SPECTRAL else openfoam.run_spectral(case)
+    wall, own = time.perf_counter() - begin, time.process_time() - own
+    slower = math.sqrt(before * machine())
+    estimate = cost(_scene(case, flow), slower)
+    flow_step, fiber_step = estimate.solver / count, estimate.daemon / count
+    row = {"slower": slower, "wall_estimated": estimate.total, "wall": wall}
+    if flow == SPECTRAL:
+        return {"step_estimated": flow_step + fiber_step, "step": own / count} | row
+    scene = read_scene(case)
+    spent = re.findall(
+        r"^ExecutionTime = ([\d.]+) s", log_file(case, scene.application).read_text(), re.MULTILINE
     )
-    wall = time.perf_counter() - start
-    if done.returncode:
-        raise RunError(f"{case}: {done.stderr.strip()}")
-    log = next(case.glob("log.*Foam")).read_text()
-    spent = [float(x) for x in re.findall(r"^ExecutionTime = ([\d.]+) s", log, re.MULTILINE)]
-    solver = (spent[-1] - spent[0]) * len(spent) / (len(spent) - 1)  # without the start of the program
-    return {
-        "solver_estimated": estimate.solver,
-        "solver": solver,
-        "wall_estimated": estimate.total,
-        "wall": wall,
-    }
+    ends = [float(spent[n]) for n in (0, -1)]  # without the start of the program
+    daemon = read_dat(results(case), daemon_table())
+    busy = float(np.quantile((daemon["sentAt"][1:] - daemon["arrivedAt"][:-1])[START:], UNDISTURBED))
+    row |= {"daemon_estimated": fiber_step, "daemon": busy}
+    return {"step_estimated": flow_step, "step": (ends[1] - ends[0]) / (len(spent) - 1)} | row
+
+
+@contextmanager
+def _quiet_and_alone() -> Iterator[None]:
+    """Without words, and with one thread for the fibers, in this process and in those that it starts."""
+    log, threads = logging.getLogger("gbm_plugin"), "NUMBA_NUM_THREADS"
+    level, before = log.level, os.environ.get(threads)
+    log.setLevel(logging.ERROR)
+    os.environ[threads] = "1"
+    try:
+        with limited_to(1):
+            yield
+    finally:
+        log.setLevel(level)
+        os.environ.pop(threads)
+        if before is not None:
+            os.environ[threads] = before
 
 
 def rows(result: dict) -> list[dict]:
@@ -75,13 +129,17 @@ def rows(result: dict) -> list[dict]:
 
 
 def table(result: dict) -> str:
-    lines = [
-        f"{'':<14}{'steps':>6} {'processor: estimated':>21}{'taken':>8}{'ratio':>7} {'wall: estimated':>16}{'taken':>8}"
-    ]
+    head = f"{'a step [ms]: estimated, taken, ratio':>77}{'wall [s]':>24}"
+    lines = [head, f"{'preset':<14}{'flow':<10}{'mobility':<10}{'steps':>6}{'flow':>20}{'daemon':>26}"]
     for r in result["runs"]:
-        ratio = r["solver_estimated"] / r["solver"]
+        daemon = _pair(r, "daemon", 1e3) if "daemon" in r else " " * 26
         lines.append(
-            f"{r['preset']:<14}{r['steps']:>6} {r['solver_estimated']:>19.2f} s{r['solver']:>6.2f} s{ratio:>7.2f} "
-            f"{r['wall_estimated']:>14.1f} s{r['wall']:>6.1f} s"
+            f"{r['preset']:<14}{r['flow']:<10}{r['mobility']:<10}{r['steps']:>6}{_pair(r, 'step', 1e3)}{daemon}"
+            f"{_pair(r, 'wall', 1.0)}"
         )
     return "\n".join(lines)
+
+
+def _pair(r: dict, name: str, unit: float) -> str:
+    estimated, taken = unit * r[f"{name}_estimated"], unit * r[name]
+    return f"{estimated:>10.3g}{taken:>9.3g}{estimated / taken:>7.2f}"
