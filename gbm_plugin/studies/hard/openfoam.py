@@ -20,10 +20,16 @@ CELLS = 16
 SPEED = 2.9  # largest |u_x| + |u_y| + |u_z| of these fields [m/s]
 RANDOM = "field random; kineticEnergy 0.5; peakWavenumber 2; maxWavenumber 5; seed 1;\n"
 NOTHING = "field modes; modes (((0 0 0) ({0} {0} {0}) (0 0 0)));\n"
-POWER = "linearForcing { type linearForcing; mode constantPower; power 0.1; }\n"
+INPUT = 0.1  # [m2/s3]
+POWER = f"linearForcing {{ type linearForcing; mode constantPower; power {INPUT}; }}\n"
 COEFFICIENT = "linearForcing { type linearForcing; mode constantCoefficient; A 0.1; }\n"
 STIRRED = "eswaranPope { type eswaranPope; variance 0.02; timeScale 1; cutoff 2; seed 1; }\n"
 TOO_LONG = "predicted with an error|blown up|not finite|[Ff]loating point|SIGFPE"
+
+
+def unresolving(product: float) -> float:
+    """Viscosity at which the largest wavenumber of the cells, π/Δx, times η is so much."""
+    return float(((product * 2 / CELLS) ** 4 * INPUT) ** (1 / 3))
 
 
 def ran(
@@ -84,8 +90,11 @@ def _cases() -> list[Case]:
                 lambda a=application, c=courant: ran(a, c), refused, openfoam=True,
             ))  # fmt: skip
         cases += [
-            Case("OpenFOAM's flow", f"k_max η = 0.1, {application}",
-                 lambda a=application: ran(a, 0.2, 40, viscosity=0.0023), openfoam=True),
+            *(
+                Case("OpenFOAM's flow", f"k_max η = {product:g}, {application}",
+                     lambda a=application, p=product: ran(a, 0.2, 40, viscosity=unresolving(p)), openfoam=True)
+                for product in (0.5, 0.1)
+            ),
             Case("forcing", f"constant power, fluid in uniform motion, {application}",
                  lambda a=application: ran(a, 0.2, 5, initial=NOTHING.format(0.5)), "nothing to force", openfoam=True),
             Case("forcing", f"eswaranPope, fluid at rest, {application}",
