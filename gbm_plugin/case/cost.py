@@ -20,7 +20,7 @@ from .layout import SPECTRAL
 from .plan import SAMPLE, need
 from .scene import Family, Scene
 from .solver import sub_cycles
-from .verdict import sub_steps
+from .verdict import GOOD, Verdict, graded, sub_steps
 
 # the task by which machines are compared, and its time where these were measured [s of one core]
 TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 15
@@ -59,6 +59,7 @@ MOVED = {
     ("implicit", "rpy"): (150e-9, 12e-9, 9e-9),
 }
 WAITS = 3.0
+PATIENCE = 0.1  # of the coupling timeout, that a step of the fibers may take: some take ten times the mean
 ATTEMPTS = 1.5  # steps of implicit and auto in a step of the flow, of all fibers in the mean
 
 START, START_ALONE, PREPARED = (
@@ -120,6 +121,18 @@ def cost(scene: Scene, slower: float | None = None) -> Cost:
         daemon=slower * steps * daemon,
         memory=_memory(scene, cells, beads),
     )
+
+
+def patience(scene: Scene, takes: Cost) -> list[Verdict]:
+    """Of fibers so dear that the solver, which waits for them, may take the daemon for lost."""
+    steps = round(max(0.0, scene.end_time - scene.start_time) / scene.time_step)
+    if scene.application == SPECTRAL or not steps:
+        return []
+    longest, step = scene.coupling.timeout, takes.daemon / steps
+    asked = f"a step of the fibers [s]; {scene.application} waits {longest:g} s"
+    change = f"timeout {math.ceil(10 * step)} (fiberProperties, coupling), or fewer beads"
+    found = graded("s/step", step, (PATIENCE * longest, longest), asked, change)
+    return [] if found.grade == GOOD else [found]
 
 
 def machine() -> float:

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import asdict
 
 from . import plan
-from .cost import cost
+from .cost import cost, patience
 from .disk import needed, readable
 from .expected import Expected, expected
 from .feedback import reaction
@@ -27,6 +27,7 @@ def figures(scene: Scene) -> dict:
     flow = expected(scene)
     families = {f.name: _family(f, scene, flow) for f in scene.families}
     disk = needed(scene) | {"free": shutil.disk_usage(scene.case).free}
+    takes = cost(scene)
     return {
         "case": scene.case.resolve().name,
         "flow": _flow(scene, flow),
@@ -35,9 +36,9 @@ def figures(scene: Scene) -> dict:
         "left_out": plan.left_out(scene),
         "exchanges": asdict(plan.exchanged(scene)),
         "stores": [asdict(item) for item in plan.stored(scene)],
-        "cost": asdict(cost(scene)),
+        "cost": asdict(takes),
         "disk": disk,
-        "verdicts": [asdict(v) for v in verdicts(scene, flow)],
+        "verdicts": [asdict(v) for v in (*verdicts(scene, flow), *patience(scene, takes))],
     }
 
 

@@ -49,7 +49,8 @@ class Verdict:
     change: str = ""
 
 
-def _graded(name: str, value: float, limits: tuple[float, float], asked: str, change: str) -> Verdict:
+def graded(name: str, value: float, limits: tuple[float, float], asked: str, change: str) -> Verdict:
+    """Good up to the first of the limits, doubtful up to the second; `change` where it is not good."""
     grade = GOOD if value <= limits[0] else DOUBTFUL if value <= limits[1] else WRONG
     return Verdict(name, value, grade, asked, "" if grade == GOOD else change)
 
@@ -72,13 +73,13 @@ def verdicts(scene: Scene, flow: Expected) -> list[Verdict]:
         worst, size = _worst(scene.families, lambda f: 2 * f.radius / eta)
         numbers = f"{worst.name}: bead Re {size**2:.2g}, Stokes {size**2 / 18:.2g}"
         thinner = math.ceil(worst.beads * size / BEAD[0])
-        found.append(_graded("d/eta", size, BEAD, numbers, f"beads {thinner}, or thinner fibers"))
+        found.append(graded("d/eta", size, BEAD, numbers, f"beads {thinner}, or thinner fibers"))
     if scene.coupling.feedback:
         found += _of_feedback(scene)
     if scene.box:
         worst, part = _worst(scene.families, lambda f: f.length / min(scene.box))
         found.append(
-            _graded("L/box", part, LENGTH, f"{worst.name}: up to half", f"length {min(scene.box) / 2:.3g}")
+            graded("L/box", part, LENGTH, f"{worst.name}: up to half", f"length {min(scene.box) / 2:.3g}")
         )
     return found
 
@@ -109,7 +110,7 @@ def _of_the_flow(scene: Scene, flow: Expected) -> list[Verdict]:
             cells = tuple(c * resolved for c in CELLS)
             enough = math.ceil(length / (cells[0] * eta))
             change = f"n {enough + enough % 2} (blockMeshDict; now {number})"
-            found.append(_graded("dx/eta", width / eta, cells, f"up to {cells[0]:g} (k_max eta 1.5)", change))
+            found.append(graded("dx/eta", width / eta, cells, f"up to {cells[0]:g} (k_max eta 1.5)", change))
         if flow.speed:
             limit = stable_courant(scene)
             narrow = min(b / n for b, n in zip(scene.box, scene.cells, strict=True))
@@ -117,13 +118,13 @@ def _of_the_flow(scene: Scene, flow: Expected) -> list[Verdict]:
             limits = tuple(c * limit for c in COURANT) if limit else IMPLICIT_COURANT
             asked = f"{scene.application} is stable to {limit:g}" if limit else f"up to {limits[0]:g}"
             change = f"deltaT {_below(limits[0] * narrow / flow.speed)} (controlDict)"
-            found.append(_graded("Courant", courant, limits, asked, change))
+            found.append(graded("Courant", courant, limits, asked, change))
     if flow.kolmogorov_time:
         tau = flow.kolmogorov_time
         limits = (coupling_step(FORECAST[0], 1.0), coupling_step(FORECAST[1], 1.0))
         asked = f"one sample a step: {coupling_error(step, tau):.1g} L in tau_eta"
         change = f"deltaT {_below(limits[0] * tau)} (controlDict)"
-        found.append(_graded("dt/tau_eta", step / tau, limits, asked, change))
+        found.append(graded("dt/tau_eta", step / tau, limits, asked, change))
     return found
 
 
@@ -131,7 +132,7 @@ def _of_feedback(scene: Scene) -> list[Verdict]:
     """Whether beads are points to the flow, few enough for an explicit exchange, and fibers that do not touch."""
     loading = exchange_step(scene)
     found = [
-        _graded("exchange", loading, EXCHANGE, f"6 pi nu a n dt: stable to {STABLE:.2g}", "a shorter deltaT")
+        graded("exchange", loading, EXCHANGE, f"6 pi nu a n dt: stable to {STABLE:.2g}", "a shorter deltaT")
     ]
     if (cell := cell_size(scene)) is not None:
         worst, ratio = _worst(scene.families, lambda f: own_ratio(f.radius, cell))
@@ -139,11 +140,11 @@ def _of_feedback(scene: Scene) -> list[Verdict]:
         asked = (
             f"{worst.name}: own disturbance of its slip, {'removed' if limits[0] > NEGLIGIBLE else 'kept'}"
         )
-        found.append(_graded("a/dx/1.77", ratio, limits, asked, "ownDisturbance auto (fiberProperties)"))
+        found.append(graded("a/dx/1.77", ratio, limits, asked, "ownDisturbance auto (fiberProperties)"))
     if scene.box:
         worst, dense = _worst(scene.families, lambda f: f.total / math.prod(scene.box) * f.length**3)
         found.append(
-            _graded("n L^3", dense, DENSE, f"{worst.name}: no contact between fibers", "fewer fibers")
+            graded("n L^3", dense, DENSE, f"{worst.name}: no contact between fibers", "fewer fibers")
         )
     return found
 
@@ -158,7 +159,7 @@ def _bead_error(scene: Scene, dissipation: float) -> list[Verdict]:
     )
     enough = enough_beads(ENDS[0], worst.length / persistence_length(worst, scene, dissipation))
     asked = f"{worst.name}: error of the ends of {worst.beads}, over L"
-    return [_graded("beads", error, ENDS, asked, f"beads {enough}, or auto (fiberProperties)")]
+    return [graded("beads", error, ENDS, asked, f"beads {enough}, or auto (fiberProperties)")]
 
 
 def _sub_steps(scene: Scene) -> Verdict:
@@ -167,12 +168,12 @@ def _sub_steps(scene: Scene) -> Verdict:
         return Verdict("sub-steps", 1, GOOD, "implicit or auto: by their own error estimate")
     worst, count = _worst(explicit, lambda f: float(sub_steps(f, scene)))
     change = "integrator auto (fiberProperties)"
-    return _graded("sub-steps", count, SUB_STEPS, f"{worst.name}: ab3 within eq. (10)", change)
+    return graded("sub-steps", count, SUB_STEPS, f"{worst.name}: ab3 within eq. (10)", change)
 
 
 def _inverse(name: str, value: float, limits: tuple[float, float], asked: str, change: str) -> Verdict:
     """Judged by its inverse."""
-    found = _graded(name, value, limits, asked, change)
+    found = graded(name, value, limits, asked, change)
     return Verdict(name, 1 / value, found.grade, asked, found.change)
 
 

@@ -256,6 +256,20 @@ def test_what_hydrodynamic_interactions_take(path, integrator, module):
     assert taken(beads=1000).daemon == pytest.approx(8 * coupled.daemon, rel=0.1)
 
 
+def test_fibers_that_outlast_the_patience_of_the_solver(path):
+    """Dense systems of 500 beads take longer than it waits, and are judged good with the timeout that is named."""
+    fibers = path / "constant/fiberProperties"
+    text = fibers.read_text().replace("integrator ab3;", "integrator implicit; coupling { timeout 10; }")
+    fibers.write_text(text.replace("beads 20;", "beads 500; mobility rpy;"))
+    scene = read_scene(path)
+    (found,) = cost_module.patience(scene, cost(scene, slower=1.0))
+    assert found.grade == "wrong" and found.value > 10
+    longer = replace(scene.coupling, timeout=float(found.change.split()[1]))
+    patient = replace(scene, coupling=longer)
+    assert not cost_module.patience(patient, cost(patient, slower=1.0))
+    assert not cost_module.patience(replace(scene, application=SPECTRAL), cost(scene, slower=1.0))
+
+
 def test_it_takes_a_moment(path, capsys):
     """The measurement of the machine is repeated transforms, and nothing that needs compiled kernels."""
     assert main(["info", str(path)]) == 0
