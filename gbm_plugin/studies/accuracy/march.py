@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,14 +15,19 @@ from ...statistics.fibers import end_to_end_squared_ratio, mean_curvature
 from ..scenes import ends_apart
 from .flows import Carrier
 
+START = 2  # steps that are corrected
+ENOUGH = 0.2  # [s], not worth to be repeated
+
 
 @dataclass(frozen=True)
 class Outcome:
-    """Positions (F, N, 3) at the end; processor time of the fibers, without the flow's, and that of the flow [s]."""
+    """Positions (F, N, 3) at the end; processor time of the fibers, without the flow's, and that of the flow [s];
+    settled: of the fibers, as if no step were one of the first, which are corrected and know no flow before them."""
 
     positions: NDArray
     radius: float
     seconds: float
+    settled: float
     sampling: float
     report: dict[str, Any]
 
@@ -41,7 +47,7 @@ def march(carrier: Carrier, fibers, step: float, end: float, **options: Any) -> 
     """fibers from time 0 to end, in steps of `step` (both in τ); options of `Stepper`."""
     tau, count = carrier.kolmogorov_time, max(1, round(end / step))
     stepper = Stepper(fibers, 0.0, **options)
-    clock, own, sampling = time.process_time, 0.0, 0.0
+    clock, own, sampling, first = time.process_time, 0.0, 0.0, 0.0
 
     def sampled() -> None:
         nonlocal own, sampling
@@ -62,16 +68,17 @@ def march(carrier: Carrier, fibers, step: float, end: float, **options: Any) -> 
             stepper.correct()
             own += clock() - begin
         sampled()
-    return Outcome(np.array(stepper.positions), fibers.radius, own, sampling, stepper.report())
+        first = own if n == START else first
+    settled = (own - first) * count / (count - START) if count > START else own
+    return Outcome(np.array(stepper.positions), fibers.radius, own, settled, sampling, stepper.report())
 
 
-def best(carrier: Carrier, fibers, step: float, end: float, enough: float = 0.2, **options: Any) -> Outcome:
-    """The fastest of up to three marches, which all find the same; of one where it takes longer than `enough` [s]."""
-    march(carrier, fibers, step, step, **options)  # kernels are loaded, and samples of the flow
-    outcome = march(carrier, fibers, step, end, **options)
-    for _ in range(2):
-        if outcome.seconds > enough:
-            break
-        again = march(carrier, fibers, step, end, **options)
-        outcome = min(outcome, again, key=lambda o: o.seconds)
-    return outcome
+def fastest(runs: Sequence[Callable[[], Outcome]]) -> list[Outcome]:
+    """The fastest of up to four marches of each, which all find the same, in turns, so that what else the machine
+    does is the same for all; of one where it takes longer than ENOUGH."""
+    found = [run() for run in runs]  # which loads kernels, and samples of the flow
+    for _ in range(3):
+        for n, run in enumerate(runs):
+            if found[n].seconds < ENOUGH:
+                found[n] = min(found[n], run(), key=lambda outcome: outcome.settled)
+    return found

@@ -6,11 +6,12 @@ fullest of the models.
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import product
 
 from ...statistics.fibers import end_to_end_squared_ratio, mean_curvature
 from .flows import cellular, turbulent
-from .march import best
+from .march import fastest, march
 
 MODELS = {
     "freeDrain": {"mobility": "freeDrain"},
@@ -28,15 +29,16 @@ def measure(quick: bool) -> list[dict]:
     rows = []
     for carrier, regime, beads in product(carriers, REGIMES, (6,) if quick else BEADS):
         fibers = carrier.fibers(REGIMES[regime], beads, BEADS[beads])
-        found = {
-            name: best(carrier, fibers, STEP, END, integrator="auto", **words)
-            for name, words in MODELS.items()
-        }
+        runs = [
+            partial(march, carrier, fibers, STEP, END, integrator="auto", **words)
+            for words in MODELS.values()
+        ]
+        found = dict(zip(MODELS, fastest(runs), strict=True))
         fullest = found["rpy, strain"]
         for name, outcome in found.items():
             x, a = outcome.positions, outcome.radius
             row = {"flow": carrier.name, "regime": regime, "beads": beads, "model": name}
-            row |= {"seconds": outcome.seconds, "cost": outcome.seconds / found["freeDrain"].seconds}
+            row |= {"seconds": outcome.settled, "cost": outcome.settled / found["freeDrain"].settled}
             row |= {"sampling_seconds": outcome.sampling, "distance": outcome.errors(fullest)["error"]}
             row |= {"r2": float(end_to_end_squared_ratio(x, a).mean())}
             rows.append(row | {"curvature": float(mean_curvature(x, a).mean()) * 2 * a * beads})
