@@ -128,9 +128,9 @@ def _in_folder(folder: Path) -> type[FunctionCache]:
 
 @lru_cache
 def _stamp(folder: Path) -> str:
-    """Changes with any source of the package: kernels hold the code of the parts that they call."""
+    """Changes with any source of the package, and of the lanes: kernels hold the code of the parts that they call."""
     digest = hashlib.sha256()
-    for path in (Path(__file__), *sorted(folder.glob("*.py"))):
+    for path in (Path(__file__), PACKAGE / "simd.py", *sorted(folder.glob("*.py"))):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 

@@ -33,7 +33,6 @@ def _prepare_grid() -> None:
     for word in grid.WORDS:
         grid.on_grid(word, field, points)
         grid.spread(word, np.zeros((1, 6)), points, (4, 4, 4))
-    grid.lagrange_gradient("cubic", field, points, spacing)
     grid.rotation(field, spacing)
     grid.gradient(field, spacing)
 

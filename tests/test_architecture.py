@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parents[1] / "gbm_plugin"
 
 # from the ground up; folders of one line do not know each other, but for the words of the fiber model
 FLOORS = [
-    {"arrays", "errors", "files", "scales", "compiled", "sampling", "signals", "threads"},
+    {"arrays", "errors", "files", "scales", "compiled", "sampling", "signals", "simd", "threads"},
     {"fiber", "flow", "case", "statistics"},
     {"spectral", "output"},
     {"report", "fleet", "prepare"},

@@ -128,7 +128,7 @@ def test_code_of_changed_sources_is_not_used(installation, tmp_path):
     """A change in what a kernel calls, in another file, counts too."""
     home = {"XDG_CACHE_HOME": tmp_path / "cache"}
     run(CONTACTS, **installation, **home)
-    with (installation["PYTHONPATH"] / "gbm_plugin/fiber/simd.py").open("a") as file:
+    with (installation["PYTHONPATH"] / "gbm_plugin/simd.py").open("a") as file:
         file.write("# changed\n")
     assert "_count" in run(CONTACTS, **installation, **home)
 

@@ -11,13 +11,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from ..compiled import inlined, kernel, woven
-from . import free_drain, rpy
-from .ambient import SAMPLES
-from .bending import TORQUES
-from .blocks import Chain, Flow, Motion, rows_of, take
-from .layout import rotated
-from .mobility import work_rows
-from .simd import (
+from ..simd import (
     add,
     add_scaled,
     arithmetic,
@@ -33,6 +27,12 @@ from .simd import (
     store3,
     subtract,
 )
+from . import free_drain, rpy
+from .ambient import SAMPLES
+from .bending import TORQUES
+from .blocks import Chain, Flow, Motion, rows_of, take
+from .layout import rotated
+from .mobility import work_rows
 
 STAGES = 2  # times per step at which the flow is wanted: its start, and its middle (by a starting step)
 LIMIT = 6 / 11  # of AB3 on the negative real axis

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ..compiled import kernel, only_read
 from ..sampling import lagrange_weights
+from ..simd import LANES, blank, load, splat, store
 from ..threads import COPYING, in_shares
 from .layout import pack, unpack
-from .simd import LANES, blank, load, splat, store
 
 SAMPLES = 3  # in the polynomial in time
 KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction

@@ -10,7 +10,7 @@ the ½.
 import numpy as np
 
 from ..compiled import inlined
-from .simd import arithmetic, cross, dot, larger, scale
+from ..simd import arithmetic, cross, dot, larger, scale
 
 TORQUES = {"consistent": 0.5, "asPrinted": 1.0}
 FOLD = 1e-12  # smallest 1 + cos θ: keeps the moment of a folded discrete rod finite

@@ -13,7 +13,7 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array, populate_array
 
-from .simd import LANES
+from ..simd import LANES
 
 
 class Material(NamedTuple):

@@ -17,11 +17,7 @@ The matrix is symmetric positive definite; it is solved by block elimination.
 from numba.extending import register_jitable
 
 from ..compiled import inlined, part
-from .bending import moment
-from .blocks import take
-from .layout import difference, mean_vector
-from .matrix3 import apply_symmetric, inverse_symmetric
-from .simd import (
+from ..simd import (
     add,
     add_scaled,
     cross,
@@ -36,6 +32,10 @@ from .simd import (
     subtract,
     zero3,
 )
+from .bending import moment
+from .blocks import take
+from .layout import difference, mean_vector
+from .matrix3 import apply_symmetric, inverse_symmetric
 
 
 @register_jitable

@@ -18,12 +18,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from ..compiled import inlined, kernel, part, woven
+from ..simd import LANES, add, add_scaled, dot, larger, load, load3, smaller, splat, sqrt, store
 from . import implicit_drain, rpy
 from .ab3 import turn_links
 from .ambient import SAMPLES
 from .blocks import Ahead, Chain, Flow, Motion, rows_of, take
 from .mobility import work_rows
-from .simd import LANES, add, add_scaled, dot, larger, load, load3, smaller, splat, sqrt, store
 
 D = 1 / (2 + np.sqrt(2))
 E32 = 6 + np.sqrt(2)

@@ -17,11 +17,7 @@ from typing import Any, NamedTuple
 from numba.extending import register_jitable
 
 from ..compiled import inlined, part
-from .bending import rod_factor
-from .blocks import take
-from .layout import difference, mean_vector
-from .matrix3 import apply, identity_plus, inverse, minus_apply, minus_product, plus_outer, product
-from .simd import (
+from ..simd import (
     add,
     add_scaled,
     arithmetic,
@@ -38,6 +34,10 @@ from .simd import (
     subtract,
     zero3,
 )
+from .bending import rod_factor
+from .blocks import take
+from .layout import difference, mean_vector
+from .matrix3 import apply, identity_plus, inverse, minus_apply, minus_product, plus_outer, product
 
 PAD = 2  # zero vectors before and after the links of a padded array: no special rows at the ends
 

@@ -6,8 +6,21 @@ The last block is filled up with copies of the last fiber.
 import numpy as np
 
 from ..compiled import inlined, kernel, only_read
+from ..simd import (
+    LANES,
+    add,
+    add_scaled,
+    arithmetic,
+    blank,
+    cross,
+    dot,
+    load3,
+    scale,
+    store3,
+    subtract,
+    zero3,
+)
 from ..threads import COPYING, in_shares
-from .simd import LANES, add, add_scaled, arithmetic, blank, cross, dot, load3, scale, store3, subtract, zero3
 
 
 @kernel

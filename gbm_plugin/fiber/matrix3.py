@@ -1,6 +1,6 @@
 """3×3 matrices of lanes: tuples of nine, row by row; symmetric ones of six (xx, xy, xz, yy, yz, zz)."""
 
-from .simd import arithmetic, cross, dot
+from ..simd import arithmetic, cross, dot
 
 
 @arithmetic

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import kernel, woven
+from ..simd import blank, load
 from . import free_drain, rpy
 from .bending import velocity_scale
 from .blocks import Chain, Flow, Material, Motion
@@ -12,7 +13,6 @@ from .fibers import Fibers
 from .layout import pack, unpack
 from .mobility import work_rows
 from .model import CURVATURE_LAWS, MotionOptions
-from .simd import blank, load
 
 
 @woven

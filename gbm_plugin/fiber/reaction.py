@@ -21,12 +21,7 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from ..compiled import inlined, kernel, part, woven
-from . import free_drain, implicit_drain, rpy
-from .bending import moment, rod_factor
-from .blocks import Ahead, Chain, Flow, Motion, rows_of, take
-from .implicit import D
-from .mobility import work_rows
-from .simd import (
+from ..simd import (
     LANES,
     add,
     add_scaled,
@@ -41,6 +36,11 @@ from .simd import (
     subtract,
     zero3,
 )
+from . import free_drain, implicit_drain, rpy
+from .bending import moment, rod_factor
+from .blocks import Ahead, Chain, Flow, Motion, rows_of, take
+from .implicit import D
+from .mobility import work_rows
 
 RIGID = 2e6  # largest σβ: stiffer fibers exert the same, but for the rounding of their moments
 

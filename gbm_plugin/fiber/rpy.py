@@ -24,6 +24,24 @@ from typing import Any, NamedTuple
 from numba.extending import register_jitable
 
 from ..compiled import inlined, part
+from ..simd import (
+    add,
+    add_scaled,
+    arithmetic,
+    cross,
+    dot,
+    larger,
+    load3,
+    load6,
+    scale,
+    select_less,
+    splat,
+    sqrt,
+    store3,
+    store6,
+    subtract,
+    zero3,
+)
 from .bending import moment, rod_factor
 from .blocks import take
 from .layout import difference, mean_vector
@@ -43,24 +61,6 @@ from .matrix3 import (
     scaled,
     times_cross,
     transposed,
-)
-from .simd import (
-    add,
-    add_scaled,
-    arithmetic,
-    cross,
-    dot,
-    larger,
-    load3,
-    load6,
-    scale,
-    select_less,
-    splat,
-    sqrt,
-    store3,
-    store6,
-    subtract,
-    zero3,
 )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..simd import LANES, blank
 from ..threads import COPYING, available, in_shares
 from . import ab3, implicit
 from .ambient import SAMPLES, Ambient
@@ -20,7 +21,6 @@ from .model import AFFORDABLE, DIVIDED, MotionOptions
 from .rates import material, rates_of_blocks
 from .reaction import EXERT, Reaction, implicit_sigma, powers_of
 from .reaction import scratch_rows as reaction_rows
-from .simd import LANES, blank
 from .state import check_state
 from .strain import with_strain
 

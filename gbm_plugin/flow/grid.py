@@ -4,107 +4,136 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import kernel, only_read, part, part_of
+from ..simd import LANES, blank, load, load_part, splat, store
 from ..threads import in_shares
 
-LAGRANGE = {"cubic": 4, "quintic": 6}  # nodes in each direction
-WORDS = ("trilinear", *LAGRANGE)
+NODES = {"trilinear": 2, "cubic": 4, "quintic": 6}  # in each direction, of Lagrange's polynomials
+WORDS = tuple(NODES)
 BOUNDED = ("trilinear", "cubic")  # those for a field that is not periodic
 LEAST_BOUNDED = 4  # values in each direction of such a field
-COST = {"trilinear": 0.3, "cubic": 3.0, "quintic": 10.0}  # of a point, in steps of a bead
-
-
-@kernel
-def trilinear(share, shares, nodes, points, out):
-    """out (P, m) from nodes (nx, ny, nz, m) at points (P, 3) in units of cells. Error O(h^2), continuous."""
-    nx, ny, nz, fields = nodes.shape
-    first, last = part_of(share, shares, points.shape[0])
-    for p in range(first, last):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
-        a, b, c = x - i, y - j, z - k
-        i0, j0, k0 = i % nx, j % ny, k % nz
-        i1, j1, k1 = (i0 + 1) % nx, (j0 + 1) % ny, (k0 + 1) % nz
-        for m in range(fields):
-            near = (nodes[i0, j0, k0, m] * (1 - c) + nodes[i0, j0, k1, m] * c) * (1 - b)
-            near += (nodes[i0, j1, k0, m] * (1 - c) + nodes[i0, j1, k1, m] * c) * b
-            far = (nodes[i1, j0, k0, m] * (1 - c) + nodes[i1, j0, k1, m] * c) * (1 - b)
-            far += (nodes[i1, j1, k0, m] * (1 - c) + nodes[i1, j1, k1, m] * c) * b
-            out[p, m] = near * (1 - a) + far * a
+COST = {"trilinear": 0.8, "cubic": 1.6, "quintic": 3.5}  # of a point, in steps of a bead
 
 
 @part
-def _nearest(x, count, scale, weights, places):
-    """The nearest periodic nodes around x, and Lagrange's weights of their values; scale: `_scale` of their number."""
-    width = scale.size
-    below = width // 2 - 1
-    i = int(np.floor(x))
-    s = x - i + below
-    left = right = 1.0
-    for q in range(width):
-        weights[q] = scale[q] * left
-        left *= s - q
-    for q in range(width - 1, -1, -1):
-        weights[q] *= right
-        right *= s - q
-    place = (i - below) % count
+def _around(x, count, polynomials, weights, places):
+    """The nearest periodic nodes around x, as many as there are `_polynomials`, and the weights of their values in
+    the value, weights[0], and in the slope, weights[1]."""
+    width = polynomials.shape[0]
+    node = np.floor(x)
+    value, slope = load(polynomials, width - 1), splat(0.0)
+    for power in range(width - 2, -1, -1):
+        slope = value + (x - node) * slope
+        value = load(polynomials, power) + (x - node) * value
+    store(weights, 0, value)
+    store(weights, 1, slope)
+    place = (int(node) - (width // 2 - 1)) % count
     for q in range(width):
         places[q] = place
         place = place + 1 if place + 1 < count else 0
 
 
 @part
-def _slopes(x, slopes, scale):
-    """Lagrange's weights of the slope at x, for the nodes of `_nearest`."""
-    width = scale.size
-    s = x - np.floor(x) + width // 2 - 1
-    for q in range(width):
-        weight, slope = 1.0, 0.0
-        for r in range(width):
-            if r != q:
-                slope = slope * (s - r) + weight
-                weight = weight * (s - r)
-        slopes[q] = slope * scale[q]
+def _row(nodes, at, count, end, line):
+    """The first count numbers from a place on, in a line of so many that ends and begins again `end` numbers later."""
+    row = load_part(nodes, at, 0, min(count, end))
+    while end < count:
+        at -= line
+        row = row + load_part(nodes, at, max(end, 0), min(count, end + line))
+        end += line
+    return row
 
 
-@kernel
-def lagrange(share, shares, nodes, points, scale, out):
-    """As `trilinear`, for m = 3, 6, ..., with Lagrange polynomials through the nearest nodes in each direction, as
-    many as `scale` has: error O(h^width)."""
+@kernel(fastmath={"contract"})
+def _interpolate(share, shares, nodes, points, first, spacing, polynomials, weight, out, extra):
+    """Of `add_on_grid`, nodes (nx, ny, nz, m). All that the nodes side by side along z hold is one row of lanes: the
+    sums over x and y are taken first, for all of it at once."""
     nx, ny, nz, fields = nodes.shape
-    width = scale.size
-    weights, places = np.empty((3, width)), np.empty((3, width), np.intp)
-    first, last = part_of(share, shares, points.shape[0])
-    for p in range(first, last):
-        _nearest(points[p, 0], nx, scale, weights[0], places[0])
-        _nearest(points[p, 1], ny, scale, weights[1], places[1])
-        _nearest(points[p, 2], nz, scale, weights[2], places[2])
-        for m in range(0, fields, 3):
-            a = b = c = 0.0
+    width, others = polynomials.shape[0], min(fields - 3, extra.shape[1])
+    columns = 0 if others else extra.shape[1]
+    length, line = width * fields, nz * fields
+    places, weights = np.empty((3, width), np.intp), np.empty((3, 2, LANES))
+    px, py, pz = places[0], places[1], places[2]
+    wx, wy, wz = weights[0], weights[1], weights[2]
+    rows = np.empty((3, -(-length // LANES), LANES))  # values, and slopes along x and y
+    values, slopes_x, slopes_y = rows[0], rows[1], rows[2]
+    value, slope_x, slope_y = values.reshape(-1), slopes_x.reshape(-1), slopes_y.reshape(-1)
+    of_x, of_y, of_z = weight / spacing[0], weight / spacing[1], weight / spacing[2]
+    begin, end = part_of(share, shares, points.shape[0])
+    for p in range(begin, end):
+        _around((points[p, 0] - first[0]) / spacing[0], nx, polynomials, wx, px)
+        _around((points[p, 1] - first[1]) / spacing[1], ny, polynomials, wy, py)
+        _around((points[p, 2] - first[2]) / spacing[2], nz, polynomials, wz, pz)
+        for n in range(values.shape[0]):
+            start = pz[0] * fields + n * LANES
+            v = dx = dy = splat(0.0)
             for i in range(width):
+                plane = slope = splat(0.0)
                 for j in range(width):
-                    row = nodes[places[0, i], places[1, j]]
-                    x = y = z = 0.0
-                    for k in range(width):
-                        node, weight = row[places[2, k]], weights[2, k]
-                        x += weight * node[m]
-                        y += weight * node[m + 1]
-                        z += weight * node[m + 2]
-                    weight = weights[0, i] * weights[1, j]
-                    a += weight * x
-                    b += weight * y
-                    c += weight * z
-            out[p, m], out[p, m + 1], out[p, m + 2] = a, b, c
+                    at = (px[i] * ny + py[j]) * line + start
+                    row = _row(nodes, at, length - n * LANES, line - start, line)
+                    plane = plane + wy[0, j] * row
+                    if columns:
+                        slope = slope + wy[1, j] * row
+                v = v + wx[0, i] * plane
+                if columns:
+                    dx = dx + wx[1, i] * plane
+                    dy = dy + wx[0, i] * slope
+            store(values, n, v)
+            if columns:
+                store(slopes_x, n, dx)
+                store(slopes_y, n, dy)
+        x = y = z = 0.0
+        for k in range(width):
+            w, m = wz[0, k], k * fields
+            x, y, z = x + w * value[m], y + w * value[m + 1], z + w * value[m + 2]
+        out[p, 0] += weight * x
+        out[p, 1] += weight * y
+        out[p, 2] += weight * z
+        for c in range(others):
+            x = 0.0
+            for k in range(width):
+                x += wz[0, k] * value[k * fields + 3 + c]
+            extra[p, c] += weight * x
+        if columns:
+            xx = xy = xz = yx = yy = yz = zx = zy = zz = 0.0
+            for k in range(width):
+                w, s, m = wz[0, k], wz[1, k], 3 * k
+                xx, yx, zx = xx + w * slope_x[m], yx + w * slope_x[m + 1], zx + w * slope_x[m + 2]
+                xy, yy, zy = xy + w * slope_y[m], yy + w * slope_y[m + 1], zy + w * slope_y[m + 2]
+                xz, yz, zz = xz + s * value[m], yz + s * value[m + 1], zz + s * value[m + 2]
+            g = (
+                of_x * xx,
+                of_y * xy,
+                of_z * xz,
+                of_x * yx,
+                of_y * yy,
+                of_z * yz,
+                of_x * zx,
+                of_y * zy,
+                of_z * zz,
+            )
+            if columns == 3:
+                extra[p, 0] += 0.5 * (g[7] - g[5])
+                extra[p, 1] += 0.5 * (g[2] - g[6])
+                extra[p, 2] += 0.5 * (g[3] - g[1])
+            else:
+                for c in range(9):
+                    extra[p, c] += g[c]
 
 
 def nodes_of(word: str) -> int:
     """How many nodes in each direction a word takes."""
-    return LAGRANGE.get(word, 2)
+    return NODES[word]
 
 
-def _scale(word: str) -> NDArray:
-    """1/prod_{r != q} (q - r) of the nodes q = 0, 1, ... of a word of `LAGRANGE`."""
-    nodes = np.arange(LAGRANGE[word])
-    return np.array([1 / np.prod([q - r for r in nodes if r != q]) for q in nodes])
+def _polynomials(word: str) -> NDArray:
+    """Lagrange's polynomials of the nodes of a word, in the distance from the one before the point: (power, node)."""
+    nodes = np.arange(NODES[word]) - (NODES[word] // 2 - 1)
+    table = blank(len(nodes))
+    for q, node in enumerate(nodes):
+        others = nodes[nodes != node]
+        table[:, q] = np.poly(others)[::-1] / np.prod(node - others)
+    return table
 
 
 def for_sampling(fields: NDArray) -> NDArray:
@@ -113,64 +142,59 @@ def for_sampling(fields: NDArray) -> NDArray:
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(fields, 0, -1)), -1, 0)
 
 
+def add_on_grid(
+    word: str,
+    weight: float,
+    fields: NDArray,
+    points: NDArray,
+    lattice: tuple[NDArray, NDArray],
+    out: NDArray,
+    extra: NDArray | None = None,
+    threads: int | None = None,
+) -> None:
+    """out (P, 3) += weight times the interpolants of the first three fields (m, nx, ny, nz), best in the order of
+    `for_sampling`, at points (P, 3), which need not lie inside the box; with an error O(h^n) of n nodes in each
+    direction. extra += weight times those of the other fields, (P, m - 3), or where there are none times rotation
+    (P, 3) or gradient (P, 9), du_i/dx_j, of the interpolant of the three, one order below its own; (P, 0): neither.
+
+    lattice: where the first node sits, and the distances of nodes, (3,) each. threads: at most so many; None: all.
+    """
+    nodes = only_read(np.moveaxis(fields, 0, -1))
+    extra = np.empty((len(points), 0)) if extra is None else extra
+    own = (nodes, only_read(points), *lattice, _polynomials(word), float(weight), out, extra)
+    in_shares(_interpolate, COST[word] * len(points), *own, most=threads)
+
+
 def on_grid(word: str, fields: NDArray, points: NDArray, threads: int | None = None) -> NDArray:
-    """Interpolate fields (m, nx, ny, nz), best in the order of `for_sampling`, nodes at 0, 1, 2, ..., at points (P, 3)
-    in units of cells, which need not lie inside the box: (P, m). m is a multiple of 3, or the word is trilinear.
-    threads: at most so many; None: all."""
-    work = COST[word] * len(points)
-    out, nodes = np.empty((len(points), len(fields))), only_read(np.moveaxis(fields, 0, -1))
-    if word == "trilinear":
-        in_shares(trilinear, work, nodes, only_read(points), out, most=threads)
-    else:
-        in_shares(lagrange, work, nodes, only_read(points), _scale(word), out, most=threads)
+    """Three fields as by add_on_grid, at points in units of cells from the first node: (P, 3)."""
+    out = np.zeros((len(points), 3))
+    add_on_grid(word, 1.0, fields, points, (np.zeros(3), np.ones(3)), out, threads=threads)
     return out
 
 
 @kernel
-def _spread_trilinear(share, shares, values, points, nodes):
-    """The transpose of `trilinear`: nodes += values (P, m) by the weights of their points, in this share's layers of
-    nodes. Each takes the points in their order: the sums do not depend on the number of shares."""
+def _spread(share, shares, values, points, polynomials, nodes):
+    """The transpose of `_interpolate`: nodes += values (P, m) by the weights of their points, in this share's layers
+    of nodes. Each takes the points in their order: the sums do not depend on the number of shares."""
     nx, ny, nz, fields = nodes.shape
     first, last = part_of(share, shares, nx)
+    width = polynomials.shape[0]
+    places, weights = np.empty((3, width), np.intp), np.empty((3, 2, LANES))
+    px, py, pz = places[0], places[1], places[2]
+    wx, wy, wz = weights[0], weights[1], weights[2]
     for p in range(points.shape[0]):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        i, j, k = int(np.floor(x)), int(np.floor(y)), int(np.floor(z))
-        a, b, c = x - i, y - j, z - k
-        i0, j0, k0 = i % nx, j % ny, k % nz
-        i1, j1, k1 = (i0 + 1) % nx, (j0 + 1) % ny, (k0 + 1) % nz
-        for ix, wx in ((i0, 1 - a), (i1, a)):
-            if ix < first or ix >= last:
-                continue
-            for jy, wy in ((j0, 1 - b), (j1, b)):
-                near, far = nodes[ix, jy, k0], nodes[ix, jy, k1]
-                plane = wx * wy
-                for m in range(0, fields, 3):  # a constant length, which the compiler unrolls
-                    for q in range(3):
-                        value = plane * values[p, m + q]
-                        near[m + q] += value * (1 - c)
-                        far[m + q] += value * c
-
-
-@kernel
-def _spread_lagrange(share, shares, values, points, scale, nodes):
-    """The transpose of `lagrange`, as above."""
-    nx, ny, nz, fields = nodes.shape
-    first, last = part_of(share, shares, nx)
-    width = scale.size
-    weights, places = np.empty((3, width)), np.empty((3, width), np.intp)
-    for p in range(points.shape[0]):
-        _nearest(points[p, 0], nx, scale, weights[0], places[0])
-        _nearest(points[p, 1], ny, scale, weights[1], places[1])
-        _nearest(points[p, 2], nz, scale, weights[2], places[2])
+        _around(points[p, 0], nx, polynomials, wx, px)
+        _around(points[p, 1], ny, polynomials, wy, py)
+        _around(points[p, 2], nz, polynomials, wz, pz)
         for i in range(width):
-            if places[0, i] < first or places[0, i] >= last:
+            if px[i] < first or px[i] >= last:
                 continue
             for j in range(width):
-                row, plane = nodes[places[0, i], places[1, j]], weights[0, i] * weights[1, j]
+                row, plane = nodes[px[i], py[j]], wx[0, i] * wy[0, j]
                 for k in range(width):
-                    node, weight = row[places[2, k]], plane * weights[2, k]
+                    node, weight = row[pz[k]], plane * wz[0, k]
                     for m in range(0, fields, 3):
-                        for q in range(3):
+                        for q in range(3):  # a constant length, which the compiler unrolls
                             node[m + q] += weight * values[p, m + q]
 
 
@@ -187,49 +211,9 @@ def spread(
     where it is given to be written; added up in the order of the points."""
     nodes = np.empty((*cells, values.shape[1])) if out is None else np.moveaxis(out, 0, -1)
     nodes[:] = 0
-    work = COST[word] * len(points)
-    if word == "trilinear":
-        in_shares(_spread_trilinear, work, only_read(values), only_read(points), nodes, most=threads)
-    else:
-        own = (only_read(values), only_read(points), _scale(word))
-        in_shares(_spread_lagrange, work, *own, nodes, most=threads)
+    own = (only_read(values), only_read(points), _polynomials(word), nodes)
+    in_shares(_spread, COST[word] * len(points), *own, most=threads)
     return np.moveaxis(nodes, -1, 0)
-
-
-@kernel
-def _lagrange_slopes(share, shares, nodes, points, scale, out):
-    """out (P, m, 3): derivatives of the interpolant of `lagrange` in units of cells."""
-    width = scale.size
-    weights, slopes = np.empty((3, width)), np.empty((3, width))
-    places = np.empty((3, width), np.intp)
-    first, last = part_of(share, shares, points.shape[0])
-    for p in range(first, last):
-        for d in range(3):
-            _nearest(points[p, d], nodes.shape[d], scale, weights[d], places[d])
-            _slopes(points[p, d], slopes[d], scale)
-        for m in range(nodes.shape[3]):
-            dx = dy = dz = 0.0
-            for i in range(width):
-                for j in range(width):
-                    row = nodes[places[0, i], places[1, j]]
-                    line = slope = 0.0
-                    for k in range(width):
-                        value = row[places[2, k], m]
-                        line += weights[2, k] * value
-                        slope += slopes[2, k] * value
-                    dx += slopes[0, i] * weights[1, j] * line
-                    dy += weights[0, i] * slopes[1, j] * line
-                    dz += weights[0, i] * weights[1, j] * slope
-            out[p, m, 0], out[p, m, 1], out[p, m, 2] = dx, dy, dz
-
-
-def lagrange_gradient(word: str, velocity: NDArray, points: NDArray, spacing: NDArray) -> NDArray:
-    """du_i/dx_j (P, 3, 3) of the interpolant of a velocity (3, nx, ny, nz), points as in `on_grid`, by a word of
-    `LAGRANGE`. One order below that of the velocity."""
-    out = np.empty((len(points), 3, 3))
-    nodes = only_read(np.moveaxis(velocity, 0, -1))
-    in_shares(_lagrange_slopes, 2 * COST[word] * len(points), nodes, only_read(points), _scale(word), out)
-    return out / spacing
 
 
 @kernel

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..sampling import NEEDS, FlowEnded, lagrange_weights, one_of, rotation_of
+from ..sampling import NEEDS, FlowEnded, lagrange_weights, one_of
 from . import grid
 
 POINTS_IN_TIME = {"linear": 2, "cubic": 4}
@@ -15,6 +15,7 @@ LOCATIONS = {"nodes": 0.0, "centres": 0.5}  # where the values sit, in cells fro
 SAME_TIME = (
     1e-6  # times closer than this part of the interval between fields are one: names of folders are rounded
 )
+COLUMNS = {"velocity": 0, "rotation": 3, "gradient": 9}
 GAP = 1.5  # an interval so much longer than both beside it, and than the usual one, lacks a field
 
 
@@ -92,17 +93,18 @@ class StoredFlow:
         if not np.isfinite(positions).all():
             raise FloatingPointError(f"a position at time {time:g} is not finite")
         numbers, weights = self._stencil(time)
-        fields = [self._field(n, "velocity") for n in numbers]
+        of_nodes = (
+            need if self.interpolation == "trilinear" else "velocity"
+        )  # others have slopes of their own
+        fields = [self._field(n, of_nodes) for n in numbers]
         if self.inside is not None and not (within := self.inside(positions)).all():
             raise ValueError(f"the flow is not known at {positions[~within][0]}")
-        points = self._in_cells(positions.reshape(-1, 3))
-        parts = (grid.on_grid(self.interpolation, field, points) for field in fields)
-        velocity = _weighted(weights, parts).reshape(positions.shape)
-        if need == "velocity":
-            return velocity, None
-        extra = _weighted(weights, (self._derivative(n, need, points) for n in numbers))
-        tail = (3, 3) if need == "gradient" else (3,)
-        return velocity, extra.reshape(*positions.shape[:-1], *tail)
+        points = positions.reshape(-1, 3)
+        velocity, extra = np.zeros(points.shape), np.zeros((len(points), COLUMNS[need]))
+        for field, weight in zip(fields, weights, strict=True):
+            grid.add_on_grid(self.interpolation, weight, field, points, self._lattice, velocity, extra)
+        shape = positions.shape + (3,) * (need == "gradient")
+        return velocity.reshape(positions.shape), None if need == "velocity" else extra.reshape(shape)
 
     @property
     def _cells(self) -> NDArray:
@@ -118,23 +120,16 @@ class StoredFlow:
         assert self._shape is not None
         return self._shape
 
-    def _in_cells(self, points: NDArray) -> NDArray:
-        """Points (P, 3) in units of cells from the first value in memory."""
-        return (points - self.origin) * (self._cells / self.box) - (self.offset - (not self.periodic))
+    @property
+    def _lattice(self) -> tuple[NDArray, NDArray]:
+        """Where the first value in memory sits, and the distances of values."""
+        spacing = self.box / self._cells
+        return self.origin + (self.offset - (not self.periodic)) * spacing, spacing
 
     def _inside(self, positions: ArrayLike) -> NDArray:
         """Whether positions (..., 3) are between the values of a bounded field: (...,)."""
         points = (np.asarray(positions) - self.origin) * (self._cells / self.box) - self.offset
         return ((points >= 0) & (points <= np.array(self._known_shape[1:]) - 1)).all(axis=-1)
-
-    def _derivative(self, number: int, need: str, points: NDArray) -> NDArray:
-        """Rotation (P, 3) or gradient (P, 9 or 3, 3) of one stored field at points in units of cells."""
-        if self.interpolation == "trilinear":
-            return grid.on_grid("trilinear", self._field(number, need), points)
-        g = grid.lagrange_gradient(
-            self.interpolation, self._field(number, "velocity"), points, self.box / self._cells
-        )
-        return g if need == "gradient" else rotation_of(g)
 
     def _stencil(self, time: float) -> tuple[list[int], list[float]]:
         """Which fields make that of a time, and their weights. Forgets the fields that are far from it."""
@@ -160,19 +155,25 @@ class StoredFlow:
 
     def kolmogorov_time(self, time: float) -> float:
         """(nu/epsilon)^(1/2) = <|omega|^2>^(-1/2) of isotropic turbulence, at the stored time nearest to this one."""
-        rotation = self._field(int(np.argmin(np.abs(self.times - time))), "rotation")
+        rotation = self._field(int(np.argmin(np.abs(self.times - time))), "rotation")[3:]
         square = 4 * float((rotation**2).sum(axis=0).mean())
         return square**-0.5 if square > 0 else np.inf
 
-    def _field(self, number: int, name: str) -> NDArray:
-        """velocity, rotation or gradient at one of the stored times, components first."""
+    def _field(self, number: int, need: str) -> NDArray:
+        """The velocity at one of the stored times and, after it, the rotation or gradient at the nodes, if need be."""
         kept = self._fields.setdefault(number, {})
         if "velocity" not in kept:
             velocity = self._velocity(number)
             kept["velocity"] = grid.for_sampling(velocity if self.periodic else grid.extended(velocity))
-        if name not in kept:
-            kept[name] = grid.for_sampling(getattr(grid, name)(kept["velocity"], self.box / self._cells))
-        return kept[name]
+        if need not in kept:
+            velocity, derivative = (
+                kept["velocity"],
+                {"rotation": grid.rotation, "gradient": grid.gradient}[need],
+            )
+            both = [velocity, derivative(velocity, self.box / self._cells)]
+            kept[need] = grid.for_sampling(np.concatenate(both))
+            kept["velocity"] = kept[need][:3]  # the same memory
+        return kept[need]
 
     def _velocity(self, number: int) -> NDArray:
         velocity = np.ascontiguousarray(self._read(number), dtype=float)
@@ -189,12 +190,6 @@ class StoredFlow:
                 f"the velocity stored at time {time:.9g} is not finite: component {component} in cell {tuple(cell)}"
             )
         return velocity
-
-
-def _weighted(weights: Iterable[float], parts: Iterable[NDArray]) -> NDArray:
-    """Weighted sum."""
-    first, *rest = (w * part for w, part in zip(weights, parts, strict=True))
-    return sum(rest, start=first)
 
 
 def refuse_gaps(times: NDArray, begin: float, end: float, written_every: float = 0.0) -> None:

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from numba import njit
 
-from gbm_plugin.fiber import matrix3, simd
+from gbm_plugin import simd
+from gbm_plugin.fiber import matrix3
 from gbm_plugin.fiber.layout import rotated
-from gbm_plugin.fiber.simd import LANES, load3, load6, load9, store, store3, store6, store9
+from gbm_plugin.simd import LANES, load3, load6, load9, store, store3, store6, store9
 
 RNG = np.random.default_rng(5)
 V, W = RNG.standard_normal((2, 3, LANES))
@@ -126,6 +127,20 @@ def test_lanes_lie_in_one_line_of_the_cache():
     assert array.flags.c_contiguous
     assert array.ctypes.data % 64 == 0
     assert not array.any()
+
+
+@pytest.mark.parametrize("precision", [float, np.float32])
+def test_a_part_of_the_lanes_is_read(precision):
+    @njit
+    def part_of_a_row(array, at, first, last, out):
+        store(out, 0, simd.load_part(array, at, first, last))
+
+    array, out = np.arange(1, 25, dtype=precision).reshape(2, 3, 4), np.empty((1, LANES))
+    for at, first, last in ((0, 0, 8), (20, -2, 4), (-3, 3, 99), (10**15, 5, 2)):
+        part_of_a_row(array, at, first, last, out)
+        places = at + np.arange(LANES)
+        read = (np.arange(LANES) >= first) & (np.arange(LANES) < last)
+        assert (out[0] == np.where(read, places + 1, 0)).all()
 
 
 def test_links_turn_as_rotations_do():

@@ -1,5 +1,5 @@
-"""A Numba number type that holds one value for each of eight fibers: kernels read like scalar code, and every
-operation is one vector instruction (or two or four on narrower machines).
+"""A Numba number type that holds eight numbers, one value for each of eight fibers, or eight in a row of a field:
+kernels read like scalar code, and every operation is one vector instruction (or two or four on narrower machines).
 
 Arrays that kernels work on have the lanes last and contiguous: shape (rows, LANES).
 
@@ -44,11 +44,10 @@ class _LanesModel(PrimitiveModel):
 
 
 def _splat(builder, scalar):
-    vector = builder.insert_element(
-        ir.Constant(_VECTOR, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0)
-    )
+    nothing = ir.Constant(ir.VectorType(scalar.type, LANES), ir.Undefined)
+    vector = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
     zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
-    return builder.shuffle_vector(vector, ir.Constant(_VECTOR, ir.Undefined), zeros)
+    return builder.shuffle_vector(vector, nothing, zeros)
 
 
 class _Symbol:
@@ -274,6 +273,33 @@ def _store(count):
 # row i of a C-contiguous (rows, LANES) array, and element i of arrays of vectors and matrices (3, 6, 9 rows each)
 load, load3, load6, load9 = _load(1), _load(3), _load(6), _load(9)
 store, store3, store6, store9 = _store(1), _store(3), _store(6), _store(9)
+
+
+@intrinsic
+def load_part(typingctx, array, at, first, last):
+    """Lanes first to last − 1 from the places at + first, … of an array as it lies in memory, of either precision; 0
+    in the other lanes, of whose places nothing is read."""
+
+    kind = ir.DoubleType() if array.dtype == types.float64 else ir.FloatType()
+    name = f"llvm.masked.load.v{LANES}f{array.dtype.bitwidth}.p0"
+
+    def codegen(context, builder, signature, args):
+        array_, at, first, last = args
+        data = context.make_array(array)(context, builder, array_).data
+        vector = ir.VectorType(kind, LANES)
+        place = builder.bitcast(builder.gep(data, [at]), vector.as_pointer())
+        numbers = ir.Constant(ir.VectorType(at.type, LANES), list(range(LANES)))
+        wanted = builder.and_(
+            builder.icmp_signed(">=", numbers, _splat(builder, first)),
+            builder.icmp_signed("<", numbers, _splat(builder, last)),
+        )
+        align, none = ir.Constant(ir.IntType(32), array.dtype.bitwidth // 8), ir.Constant(vector, None)
+        function = ir.FunctionType(vector, [place.type, align.type, wanted.type, vector])
+        call = cgutils.get_or_insert_function(builder.module, function, name)
+        value = builder.call(call, [place, align, wanted, none])
+        return value if kind == ir.DoubleType() else builder.fpext(value, _VECTOR)
+
+    return lanes(array, types.intp, types.intp, types.intp), codegen
 
 
 # three-vectors are tuples of three lane numbers
