@@ -152,7 +152,7 @@ def _coupled(case: Path, word: str, cells: int, stiffness: float) -> tuple[NDArr
         first = state["a/samples"][:, 0].reshape(COUNT, 2, BEADS, 3)
     with open_recording(results(case)) as recording:
         last = recording.families["a"].positions[-1]
-    seconds = float(np.median(read_dat(results(case), COUPLING_TABLE)["sampling"][2:]))
+    seconds = float(np.min(read_dat(results(case), COUPLING_TABLE)["sampling"][2:]))
     return first[:, 0].reshape(-1, 3), first[:, 1].reshape(-1, 3), last, seconds
 
 
