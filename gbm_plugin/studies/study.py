@@ -17,8 +17,10 @@ import ast
 import csv
 import inspect
 import json
+import logging
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -94,6 +96,18 @@ def option(parser: argparse.ArgumentParser, run: Callable, name: str, text: str,
         words = {"type": type(default)} | words
     text = f"{text} (default: {shown})" if default is not None and len(str(shown)) < 60 else text
     return parser.add_argument(flag, default=default, help=text.replace("%", "%%"), **words)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Runs in here do not say what they do, but what is wrong."""
+    log = logging.getLogger("gbm_plugin")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def steps(work: Iterable, total: int, title: str) -> Iterator:

@@ -27,6 +27,7 @@ from ...sampling import rotation_of
 from ...spectral import SpectralSolver
 from ...spectral.interpolation import WORDS
 from ..scenes import ends_apart
+from ..study import quiet
 from .flows import BOX, Carrier
 from .front import mark_front
 from .march import march
@@ -146,7 +147,8 @@ def _coupled(case: Path, word: str, cells: int, stiffness: float) -> tuple[NDArr
     (case / "system/initialFieldDict").write_text(HEADER + field)
     sizes = {"count": COUNT, "beads": BEADS, "length": LENGTH, "stiffness": stiffness}
     (case / "constant/fiberProperties").write_text(HEADER + FIBERS.format(word=word, steps=steps, **sizes))
-    run_openfoam(case)
+    with quiet():
+        run_openfoam(case)
     with np.load(case / f"{STEP:g}" / "uniform/fibers.npz") as state:
         assert state["a/sample_times"][0] == 0
         first = state["a/samples"][:, 0].reshape(COUNT, 2, BEADS, 3)

@@ -10,7 +10,6 @@ the machine is at that time.
 from __future__ import annotations
 
 import argparse
-import logging
 import math
 import os
 import re
@@ -33,7 +32,7 @@ from ...fiber.model import MOBILITIES
 from ...output.tables import read_dat
 from ...run import openfoam
 from ...threads import limited_to
-from ..study import option
+from ..study import option, quiet
 from ..study import steps as progress
 
 DEFAULT = ("default", "quick", "pimpleFoam", "flow-I", "taylor-green")
@@ -87,7 +86,7 @@ def _cut(case: Path, flow: str, slower: float, seconds: float) -> int:
 def _measured(case: Path, flow: str, count: int) -> dict[str, float]:
     before = machine()
     begin, own = time.perf_counter(), time.process_time()
-    with _quiet_and_alone():
+    with quiet(), _one_thread():
         openfoam.run(case) if flow != SPECTRAL else openfoam.run_spectral(case)
     wall, own = time.perf_counter() - begin, time.process_time() - own
     slower = math.sqrt(before * machine())
@@ -108,20 +107,18 @@ def _measured(case: Path, flow: str, count: int) -> dict[str, float]:
 
 
 @contextmanager
-def _quiet_and_alone() -> Iterator[None]:
-    """Without words, and with one thread for the fibers, in this process and in those that it starts."""
-    log, threads = logging.getLogger("gbm_plugin"), "NUMBA_NUM_THREADS"
-    level, before = log.level, os.environ.get(threads)
-    log.setLevel(logging.ERROR)
-    os.environ[threads] = "1"
+def _one_thread() -> Iterator[None]:
+    """For the fibers, in this process and in those that it starts."""
+    name = "NUMBA_NUM_THREADS"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
     try:
         with limited_to(1):
             yield
     finally:
-        log.setLevel(level)
-        os.environ.pop(threads)
+        os.environ.pop(name)
         if before is not None:
-            os.environ[threads] = before
+            os.environ[name] = before
 
 
 def rows(result: dict) -> list[dict]:

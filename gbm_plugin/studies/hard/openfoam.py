@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import tempfile
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from ...output.recording import open_recording
 from ...output.tables import read_dat
 from ...run.openfoam import run
 from ..scenes import scene_copy, three_families
+from ..study import quiet
 from .case import Case, Found
 
 CELLS = 16
@@ -53,13 +53,8 @@ def ran(
             SHIPPED, Path(folder) / "case", cells=CELLS, steps=steps, end_time=steps * step, viscosity=viscosity,
             write_every=steps, texts=texts, entries={"system/controlDict": {"application": application}},
         )  # fmt: skip
-        quiet = logging.getLogger("gbm_plugin")
-        level = quiet.level
-        quiet.setLevel(logging.ERROR)
-        try:
+        with quiet():
             run(case)
-        finally:
-            quiet.setLevel(level)
         return _found(case, force.split()[0])
 
 
