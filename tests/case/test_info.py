@@ -20,7 +20,7 @@ from gbm_plugin.case.solver import SPECTRAL_COURANT, TRUNCATED
 from gbm_plugin.case.verdict import verdicts
 from gbm_plugin.cli import main
 from gbm_plugin.fiber import ab3, implicit
-from gbm_plugin.fiber.simd import LANES
+from gbm_plugin.simd import LANES
 from gbm_plugin.spectral.modes import Modes
 from gbm_plugin.spectral.solver import STABLE
 
