@@ -1,6 +1,7 @@
-"""Which tests run: `pytest` alone those of pure Python, `pytest FILES` all in them, `pytest --all` every one.
+"""Which tests run: `pytest` alone those of pure Python, `pytest --all` also those that need OpenFOAM or take long,
+`pytest --exhaustive` also further cases of what another test shows, and `pytest FILES` all in them.
 
-What needs OpenFOAM or takes long says so by a marker. A -m or -k of one's own is taken as it is. OpenFOAM's programs
+Markers say which these are. A -m or -k of one's own is taken as it is. OpenFOAM's programs
 refuse to run in a test that is not marked, but for foamDictionary, by which every case is read.
 """
 
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-LEFT_OUT = ("openfoam", "slow")  # of a run that names nothing
+LEFT_OUT = ("openfoam", "slow", "exhaustive")  # of a run that names nothing
 PROGRAMS = ["blockMesh", "boxFoam", "decomposePar", "foamToVTK", "icoFoam", "mpirun"]
 PROGRAMS += ["pimpleFoam", "pisoFoam", "postProcess", "reconstructPar", "renumberMesh"]
 REFUSAL = '#!/bin/sh\necho "this test runs ${0##*/} and is not marked openfoam" >&2\nexit 1\n'
@@ -22,12 +23,13 @@ _refusals = tempfile.TemporaryDirectory(prefix="gbm-tests-")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--all", action="store_true", help="also tests that need OpenFOAM or take long")
+    parser.addoption("--exhaustive", action="store_true", help="every test: also further cases of another's")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     named = config.args_source is not pytest.Config.ArgsSource.TESTPATHS
     if named or config.option.markexpr or config.option.keyword:
-        config.option.all = True  # xdist hands the options to its workers
+        config.option.exhaustive = True  # xdist hands the options to its workers
     for name in PROGRAMS:
         program = Path(_refusals.name) / name
         program.write_text(REFUSAL)
@@ -35,9 +37,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if config.option.all:
+    if config.option.exhaustive:
         return
-    left_out = [item for item in items if any(item.get_closest_marker(name) for name in LEFT_OUT)]
+    names = LEFT_OUT[-1:] if config.option.all else LEFT_OUT
+    left_out = [item for item in items if any(item.get_closest_marker(name) for name in names)]
     config.hook.pytest_deselected(items=left_out)
     items[:] = [item for item in items if item not in set(left_out)]
 

@@ -9,7 +9,7 @@ import numpy as np
 from gbm_plugin import Fibers, simulate
 from gbm_plugin.spectral import EswaranPope, SpectralSolver
 
-CELLS, VISCOSITY, RODS, BEADS, STEP = 32, 0.01, 20000, 6, 5e-3
+CELLS, VISCOSITY, RODS, BEADS, STEP = 32, 0.01, 20000, 3, 5e-3
 
 
 def main() -> float:

@@ -68,7 +68,9 @@ def expected(one):
     return recorded(one)
 
 
-@pytest.mark.parametrize("transport, daemons", [("socket", 2), ("socket", 3), ("tcp", 2), ("file", 2)])
+@pytest.mark.parametrize(
+    "transport, daemons", [("socket", 3), ("file", 2), pytest.param("tcp", 2, marks=pytest.mark.exhaustive)]
+)
 def test_on_one_rank_they_move_the_same_fibers(tmp_path, expected, transport, daemons):
     case = make(tmp_path / "case", daemons, transport=transport)
     run_case(case)
@@ -76,7 +78,7 @@ def test_on_one_rank_they_move_the_same_fibers(tmp_path, expected, transport, da
     np.testing.assert_array_equal(recorded(case), expected)
 
 
-@pytest.mark.parametrize("daemons, ranks", [(2, 2), (3, 2), (2, 4)])
+@pytest.mark.parametrize("daemons, ranks", [(3, 2), pytest.param(2, 4, marks=pytest.mark.exhaustive)])
 def test_on_several_ranks(tmp_path, expected, daemons, ranks):
     case = make(tmp_path / "case", daemons, ranks)
     run_case(case, "--parallel")

@@ -639,7 +639,11 @@ def test_run_that_hangs_before_its_first_step(long_case, silence):
     assert not list(members(solver))
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.exhaustive)],
+    ids=["Ctrl-C", "SIGTERM"],
+)
 def test_run_stopped_on_request(number, long_case):
     """Flow and fibers are written at the step under way, though no write was due."""
     set_entry(long_case / "system/controlDict", "writeInterval", "100000")

@@ -38,7 +38,11 @@ def test_restart_to_the_same_bits(tmp_path, ranks):
             assert a == b, name
 
 
-@pytest.mark.parametrize("options", [(), ("--parallel",)], ids=["serial", "parallel"])
+@pytest.mark.parametrize(
+    "options",
+    [pytest.param((), marks=pytest.mark.exhaustive), ("--parallel",)],
+    ids=["serial", "parallel"],
+)
 def test_fibers_ride(tmp_path, options):
     """A run of flow and fibers that was stopped in between equals one that was not, to the same bits."""
     positions = []

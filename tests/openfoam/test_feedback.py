@@ -95,7 +95,7 @@ def test_the_budget_closes_with_the_exchange(whole):
         assert np.abs(flow[f"meanU{c}"]).max() < 1e-13
 
 
-@pytest.mark.parametrize("daemons, ranks", [(2, 1), (2, 2)])
+@pytest.mark.parametrize("daemons, ranks", [pytest.param(2, 1, marks=pytest.mark.exhaustive), (2, 2)])
 def test_on_ranks_and_daemons_it_is_the_same_run(whole, tmp_path, daemons, ranks):
     solver, path = whole
     steps = 20 if solver == "boxFoam" else 3  # tight linear solvers on ranks take their time

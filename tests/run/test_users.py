@@ -56,7 +56,7 @@ def test_a_pipe_that_nobody_reads(case):
     assert latest(case) == 0.4
 
 
-@pytest.mark.parametrize("how", ["serial", "parallel"])
+@pytest.mark.parametrize("how", [pytest.param("serial", marks=pytest.mark.exhaustive), "parallel"])
 def test_a_queue_that_ends_all_processes_of_a_job(how, case):
     """Row 8: SIGTERM to gbm run, daemon, mpirun and every rank."""
     endless(case)
@@ -82,7 +82,9 @@ def test_a_queue_that_ends_all_processes_of_a_job(how, case):
     assert gbm("run", case).stdout.endswith("is complete; --fresh repeats it\n")
 
 
-@pytest.mark.parametrize("number", [signal.SIGUSR1, signal.SIGHUP], ids=["USR1", "HUP"])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGUSR1, marks=pytest.mark.exhaustive), signal.SIGHUP], ids=["USR1", "HUP"]
+)
 def test_signals_of_queues_to_gbm_run(number, case):
     endless(case)
     set_entry(case / CONTROL, "startFrom", "startTime")

@@ -48,7 +48,7 @@ def test_slices_and_restarts_change_nothing(tmp_path):
         np.testing.assert_allclose(whole.stepper.positions, moved.stepper.positions, atol=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.exhaustive  # the slices above have what a kill leaves
 def test_goes_on_after_a_kill(tmp_path):
     """SIGKILL in the middle; the same command then ends with what an undisturbed one finds."""
     argv = [sys.executable, "-m", "gbm_plugin.cli", "study", "buckling", "--sp", "1e4", "--json", "f.json"]

@@ -24,6 +24,7 @@ def test_flow_and_fibers_converge_at_second_order(result):
     assert result["rows"][1]["velocity_error"] < 0.1
 
 
+@pytest.mark.exhaustive
 def test_cubic_interpolations_take_out_the_larger_part_of_the_error(result, pimple_case):
     """The preset pimpleFoam, on a mesh where all that is left is of second order: viscosity, pressure and step."""
     plain, cubic = result["rows"][1], convergence.run(pimple_case, [24], 0.04, fibers=15)["rows"][0]
