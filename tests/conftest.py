@@ -15,11 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
-import gbm_plugin.run.openfoam  # noqa: F401  as is the next: by a run, and so once for all that are forked here
 import numpy as np
-import PyFoam.LogAnalysis.FoamLogAnalyzer  # noqa: F401
+import PyFoam.LogAnalysis.FoamLogAnalyzer  # noqa: F401  by a run, and so once for all that are forked here
 import pytest
 
+import gbm_plugin.run.openfoam  # noqa: F401  likewise
 from gbm_plugin.case.made import RECORD
 from gbm_plugin.case.openfoam import command, environment
 from gbm_plugin.case.prepare import initial_fields, make_mesh, utility
