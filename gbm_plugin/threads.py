@@ -38,7 +38,8 @@ def limited_to(threads: int) -> Iterator[None]:
 def in_shares(kernel: Callable[..., None], beads: float, *arguments: Any, most: int | None = None) -> None:
     """kernel(share, shares, *arguments) for every share, as many as so many bead-steps are worth, at most `most`.
 
-    A kernel does the blocks share, share + shares, …: what it writes does not depend on their number.
+    A kernel does its part of the blocks, compiled.part_of: what it writes does not depend on their number, and each
+    thread finds in its cache what it wrote there before.
     """
     global _pool, _workers
     shares = max(1, min(most or _most, _most, int(beads / BEADS_PER_THREAD)))

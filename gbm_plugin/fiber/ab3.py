@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from ..compiled import inlined, kernel, woven
+from ..compiled import inlined, kernel, part_of, woven
 from ..simd import (
     add,
     add_scaled,
@@ -184,7 +184,8 @@ def _advance(link_rates, share, shares, material, samples, plan, before, after, 
     links = rows // 3 - 1
     (multipliers, middle, rates, velocity, rotation, ring), used = layout(scratch[share], links + 1)
     work, _ = take(scratch[share], used, scratch.shape[1] - used)
-    for b in range(share, state.shape[0], shares):
+    begin, end = part_of(share, shares, state.shape[0])
+    for b in range(begin, end):
         now, past, far = state[b], before.newest[b], before.older[b]
         worst, pull, stiffness = splat(0.0), splat(0.0), load(beta, b)
         for s in range(count):

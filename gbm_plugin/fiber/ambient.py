@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel, only_read
+from ..compiled import kernel, only_read, part_of
 from ..sampling import lagrange_weights
 from ..simd import LANES, blank, load, splat, store
 from ..threads import COPYING, in_shares
@@ -18,7 +18,8 @@ KEPT = SAMPLES + 1  # one more, to compare the newest with its prediction
 @kernel
 def _squared_gap(share, shares, new, first, second, third, weights, square):
     """Sum over the rows of a fiber of (new − weighted predictors)², fields in blocks (B, rows, LANES)."""
-    for b in range(share, new.shape[0], shares):
+    begin, end = part_of(share, shares, new.shape[0])
+    for b in range(begin, end):
         for row in range(new.shape[1]):
             for lane in range(LANES):
                 predicted = weights[0] * first[b, row, lane] + weights[1] * second[b, row, lane]
@@ -30,7 +31,8 @@ def _squared_gap(share, shares, new, first, second, third, weights, square):
 def _receive(share, shares, velocity, rotation, velocities, rotations, sums):
     """Both fields (F, rows) as blocks (B, rows, LANES); sums (B, LANES): of all numbers of a fiber."""
     last = velocity.shape[0] - 1
-    for b in range(share, sums.shape[0], shares):
+    begin, end = part_of(share, shares, sums.shape[0])
+    for b in range(begin, end):
         total = splat(0.0)
         for field, blocks in ((velocity, velocities), (rotation, rotations)):
             for lane in range(LANES):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiled import inlined, kernel, only_read
+from ..compiled import inlined, kernel, only_read, part_of
 from ..threads import in_shares
 
 
@@ -18,7 +18,8 @@ def _between(positions, f, i, j):
 
 @kernel
 def _count(share, shares, positions, diameter, counts):
-    for f in range(share, positions.shape[0], shares):
+    begin, end = part_of(share, shares, positions.shape[0])
+    for f in range(begin, end):
         for i in range(positions.shape[1]):
             for j in range(i + 2, positions.shape[1]):
                 x = _between(positions, f, i, j)
@@ -28,7 +29,8 @@ def _count(share, shares, positions, diameter, counts):
 
 @kernel
 def _push(share, shares, positions, diameter, rate, velocity):
-    for f in range(share, positions.shape[0], shares):
+    begin, end = part_of(share, shares, positions.shape[0])
+    for f in range(begin, end):
         for i in range(positions.shape[1]):
             for j in range(i + 2, positions.shape[1]):
                 x = _between(positions, f, i, j)

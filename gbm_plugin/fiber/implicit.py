@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from ..compiled import inlined, kernel, part, woven
+from ..compiled import inlined, kernel, part, part_of, woven
 from ..simd import LANES, add, add_scaled, dot, larger, load, load3, smaller, splat, sqrt, store
 from . import implicit_drain, rpy
 from .ab3 import turn_links
@@ -162,7 +162,8 @@ def _attempt(stage, share, shares, material, members, samples, tolerance, before
     k2, _ = take(k, rows, rows)
     k3, _ = take(k, 2 * rows, rows)
     eight = np.empty(LANES, np.int64)
-    for group in range(share, (len(members) + LANES - 1) // LANES, shares):
+    begin, end = part_of(share, shares, (len(members) + LANES - 1) // LANES)
+    for group in range(begin, end):
         whole = True
         for lane in range(LANES):
             eight[lane] = members[min(group * LANES + lane, len(members) - 1)]

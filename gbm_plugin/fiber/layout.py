@@ -5,7 +5,7 @@ The last block is filled up with copies of the last fiber.
 
 import numpy as np
 
-from ..compiled import inlined, kernel, only_read
+from ..compiled import inlined, kernel, only_read, part_of
 from ..simd import (
     LANES,
     add,
@@ -25,7 +25,8 @@ from ..threads import COPYING, in_shares
 
 @kernel
 def _pack(share, shares, values, blocks):
-    for b in range(share, blocks.shape[0], shares):
+    begin, end = part_of(share, shares, blocks.shape[0])
+    for b in range(begin, end):
         for lane in range(LANES):
             fiber = min(b * LANES + lane, values.shape[0] - 1)
             for row in range(values.shape[1]):
@@ -34,7 +35,8 @@ def _pack(share, shares, values, blocks):
 
 @kernel
 def _unpack(share, shares, blocks, values):
-    for b in range(share, blocks.shape[0], shares):
+    begin, end = part_of(share, shares, blocks.shape[0])
+    for b in range(begin, end):
         for fiber in range(b * LANES, min((b + 1) * LANES, values.shape[0])):
             for row in range(values.shape[1]):
                 values[fiber, row] = blocks[b, row, fiber % LANES]
@@ -62,7 +64,8 @@ def bead_positions(share, shares, state, diameter, scratch, positions):
     (threads, 3N or more, LANES)."""
     beads = positions.shape[1]
     local = scratch[share]
-    for b in range(share, state.shape[0], shares):
+    begin, end = part_of(share, shares, state.shape[0])
+    for b in range(begin, end):
         block = state[b]
         bead, total = zero3(), zero3()
         store3(local, 0, bead)

@@ -20,7 +20,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from ..compiled import inlined, kernel, part, woven
+from ..compiled import inlined, kernel, part, part_of, woven
 from ..simd import (
     LANES,
     add,
@@ -168,7 +168,8 @@ def _exert(
     beads = out.shape[2]
     parts, used = layout(scratch[share], beads)
     work, _ = take(scratch[share], used, scratch.shape[1] - used)
-    for b in range(share, state.shape[0], shares):
+    begin, end = part_of(share, shares, state.shape[0])
+    for b in range(begin, end):
         chain = Chain(state[b], load(beta, b), radius, law)
         stiff = solve(chain, Flow(velocity[b], rotation[b]), sigma, parts, work)
         _loads(state[b], stiff, parts.multipliers, parts.moments, parts.force, parts.torque)

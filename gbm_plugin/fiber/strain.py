@@ -11,7 +11,7 @@ lengths in a,
 
 import numpy as np
 
-from ..compiled import kernel, only_read
+from ..compiled import kernel, only_read, part_of
 from ..sampling import rotation_of
 from ..threads import in_shares
 
@@ -19,7 +19,8 @@ from ..threads import in_shares
 @kernel
 def _disturb(share, shares, positions, strain, radius, velocity, rotation):
     count, beads = positions.shape[:2]
-    for f in range(share, count, shares):
+    begin, end = part_of(share, shares, count)
+    for f in range(begin, end):
         for i in range(beads):
             for j in range(beads):
                 if i == j:
