@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PACKAGES = ("lammps[mpi]", "pyelastica")
-MOST_SECONDS = 600.0  # of one run of a program
+MOST_SECONDS = 120.0  # of one run of a program
 
 
 @dataclass(frozen=True)

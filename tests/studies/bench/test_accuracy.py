@@ -21,6 +21,20 @@ def test_front():
     assert [row["on_front"] for row in rows] == [True, True, False, True]
 
 
+def test_the_default_over_the_front():
+    """Beside what has its error, whatever a worse one takes; in rows alike alone."""
+    same = {"flow": "f", "regime": "r", "mobility": "m", "step": 0.1}
+    own = same | {"default": True, "seconds": 3.0, "error": 1e-3}
+    rows = [
+        own,
+        same | {"default": False, "seconds": 2.0, "error": 1.1e-3},
+        same | {"default": False, "seconds": 1.0, "error": 2e-3},
+        own | {"regime": "other"},
+    ]
+    ratios = integrators.over_the_front(rows)
+    assert ratios == {("f", "r", "m", 0.1): 1.5, ("f", "other", "m", 0.1): 1.0}
+
+
 def test_ab3_and_extrapolation_are_of_third_order(monkeypatch):
     monkeypatch.setattr(integrators, "REGIMES", {"flexible": (0.3, 5, 8)})
     monkeypatch.setattr(integrators, "TOLERANCES", (1e-3,))
