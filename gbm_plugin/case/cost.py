@@ -28,20 +28,15 @@ TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 15
 # a step of a flow [s]: its log and its tables, and for each cell
 STEP = 0.4e-3
 BOX_FOAM = 3.0e-9  # times log2(cells)
-OUTER, PRESSURE = (
-    1.6e-6,
-    0.25e-6,
-)  # of pimpleFoam and pisoFoam: an outer corrector, each pressure equation in it
-MODES, FIELD = (
-    1.8e-9,
-    0.45e-9,
-)  # of the spectral solver, times log2(nodes): a step; a field at the nodes to sample
+OUTER, PRESSURE = 1.6e-6, 0.25e-6  # pimpleFoam, pisoFoam: an outer corrector, a pressure equation in it
+# of the spectral solver, times log2(nodes): a step; one of the fields at the nodes that are sampled
+MODES, FIELD = 2.2e-9, 0.42e-9
 RUNGE_KUTTA = 6  # right-hand sides more, in the first steps of the spectral solver
 
 # velocity and rotation at a bead [s], by the interpolation
-AT_CELLS = {"trilinear": 0.1e-6, "cubic": 0.2e-6, "quintic": 0.4e-6}  # of our own; and of OpenFOAM's own:
-AT_CELLS_OTHER = 1.0e-6
-AT_NODES = {"trilinear": 0.2e-6, "cubic": 1.0e-6, "quintic": 2.0e-6}  # and, a mode, of the sum of them:
+AT_CELLS = {"trilinear": 0.1e-6, "cubic": 0.2e-6, "quintic": 0.4e-6}  # our own; and OpenFOAM's own,
+AT_CELLS_OTHER, WHOLE = 1.0e-6, 0.15e-6  # which make fields of points and vorticity, for each cell
+AT_NODES = {"trilinear": 0.2e-6, "cubic": 0.4e-6, "quintic": 0.75e-6}  # and, a mode, of the sum of them:
 AT_NODES_EXACT = 0.7e-9
 # bytes of the fields, beyond which they are not in the cache, and a bead takes more
 CACHE, MISSED = 24e6, {"trilinear": 1e-6, "cubic": 2e-6, "quintic": 6e-6}
@@ -62,11 +57,8 @@ WAITS = 3.0
 PATIENCE = 0.1  # of the coupling timeout, that a step of the fibers may take: some take ten times the mean
 ATTEMPTS = 1.5  # steps of implicit and auto in a step of the flow, of all fibers in the mean
 
-START, START_ALONE, PREPARED = (
-    3.5,
-    2.5,
-    2e-6,
-)  # programs and kernels, of two sides and of one; initial field, a cell
+START, START_ALONE = 3.5, 2.5  # programs and kernels, of two sides and of one
+PREPARED = 2e-6  # initial field and mesh, for each cell
 DISK, RECORD = 200e6, 2e-3  # bytes a second into time folders; seconds of a record
 
 # bytes at their highest: of programs without cells and beads, a cell, a bead, and N^2 of a fiber of N beads with rpy
@@ -170,7 +162,7 @@ def _sampled(scene: Scene, cells: int, beads: int) -> float:
     missed = MISSED.get(word, 0.0)
     if scene.application != SPECTRAL:
         bead = AT_CELLS.get(word, AT_CELLS_OTHER) + (missed if 24 * cells > CACHE else 0.0)
-        return EXCHANGE + beads * (BEAD + bead)
+        return EXCHANGE + beads * (BEAD + bead) + (0.0 if word in AT_CELLS else WHOLE * cells)
     numbers = SAMPLE[need(scene)]
     part = numbers / SAMPLE["rotation"]
     if word == "exact":
