@@ -78,32 +78,45 @@ def _cut(case: Path, flow: str, slower: float, seconds: float) -> int:
     whole = cost(scene, slower)
     steps = round((scene.end_time - scene.start_time) / scene.time_step)
     count = min(steps, max(LEAST, round(steps * seconds / (whole.solver + whole.daemon))))
-    times = {"endTime": scene.start_time + count * scene.time_step, "writeInterval": count}
-    set_entries(case / "system/controlDict", times)
+    _end_after(case, scene, count)
     return count
 
 
+def _end_after(case: Path, scene: Scene, count: int) -> None:
+    times = {"endTime": scene.start_time + count * scene.time_step, "writeInterval": count}
+    set_entries(case / "system/controlDict", times)
+
+
 def _measured(case: Path, flow: str, count: int) -> dict[str, float]:
-    before = machine()
-    begin, own = time.perf_counter(), time.process_time()
-    with quiet(), _one_thread():
-        openfoam.run(case) if flow != SPECTRAL else openfoam.run_spectral(case)
-    wall, own = time.perf_counter() - begin, time.process_time() - own
+    before, scene, first = machine(), _scene(case, flow), 0.0
+    if flow == SPECTRAL:  # the same process begins and takes steps: what START of them take is taken off
+        _end_after(case, scene, START)
+        _, first = _timed(case, flow)
+        _end_after(case, scene, count)
+    wall, own = _timed(case, flow)
     slower = math.sqrt(before * machine())
-    estimate = cost(_scene(case, flow), slower)
-    flow_step, fiber_step = estimate.solver / count, estimate.daemon / count
+    estimate = cost(scene, slower)
     row = {"slower": slower, "wall_estimated": estimate.total, "wall": wall}
     if flow == SPECTRAL:
-        return {"step_estimated": flow_step + fiber_step, "step": own / count} | row
-    scene = read_scene(case)
-    spent = re.findall(
-        r"^ExecutionTime = ([\d.]+) s", log_file(case, scene.application).read_text(), re.MULTILINE
-    )
-    ends = [float(spent[n]) for n in (0, -1)]  # without the start of the program
+        begun = cost(replace(scene, end_time=scene.start_time + START * scene.time_step), slower)
+        estimated = (estimate.solver + estimate.daemon - begun.solver - begun.daemon) / (count - START)
+        return {"step_estimated": estimated, "step": (own - first) / (count - START)} | row
+    log = log_file(case, scene.application).read_text()
+    spent = [float(t) for t in re.findall(r"^ExecutionTime = ([\d.]+) s", log, re.MULTILINE)]
     daemon = read_dat(results(case), daemon_table())
     busy = float(np.quantile((daemon["sentAt"][1:] - daemon["arrivedAt"][:-1])[START:], UNDISTURBED))
-    row |= {"daemon_estimated": fiber_step, "daemon": busy}
-    return {"step_estimated": flow_step, "step": (ends[1] - ends[0]) / (len(spent) - 1)} | row
+    row |= {"daemon_estimated": estimate.daemon / count, "daemon": busy}
+    step = (spent[-1] - spent[0]) / (len(spent) - 1)  # without the start of the program
+    return {"step_estimated": estimate.solver / count, "step": step} | row
+
+
+def _timed(case: Path, flow: str) -> tuple[float, float]:
+    """Seconds of a run, by the clock and of processor time of this process."""
+    run_case = openfoam.run_spectral if flow == SPECTRAL else openfoam.run
+    begin, own = time.perf_counter(), time.process_time()
+    with quiet(), _one_thread():
+        run_case(case, fresh=True)
+    return time.perf_counter() - begin, time.process_time() - own
 
 
 @contextmanager
