@@ -30,7 +30,7 @@ STEP = 0.4e-3
 BOX_FOAM = 3.0e-9  # times log2(cells)
 OUTER, PRESSURE = 1.6e-6, 0.25e-6  # pimpleFoam, pisoFoam: an outer corrector, a pressure equation in it
 # of the spectral solver, times log2(nodes): a step; one of the fields at the nodes that are sampled
-MODES, FIELD = 2.2e-9, 0.42e-9
+MODES, FIELD = 2.4e-9, 0.5e-9
 RUNGE_KUTTA = 6  # right-hand sides more, in the first steps of the spectral solver
 
 # velocity and rotation at a bead [s], by the interpolation
@@ -41,9 +41,10 @@ AT_NODES_EXACT = 0.7e-9
 # bytes of the fields, beyond which they are not in the cache, and a bead takes more
 CACHE, MISSED = 24e6, {"trilinear": 1e-6, "cubic": 2e-6, "quintic": 6e-6}
 
-# a step of the fibers [s]: of the coupling, to find and send beads; of who moves them, beside moving
+# a step of the fibers [s]: of the coupling, to find and send beads; of a daemon, or of one process with the flow,
+# beside moving them; of each family; and to keep what comes of a bead
 EXCHANGE, BEAD = 0.3e-3, 0.1e-6
-DAEMON, FAMILY, TAKEN = 0.7e-3, 0.1e-3, 46e-9
+DAEMON, ALONE, FAMILY, TAKEN = 1.2e-3, 0.4e-3, 0.1e-3, 46e-9
 LANES = 8  # fibers that are moved at once
 # a bead in one step of an integrator [s]: by itself, with each other bead of its fiber, and its part of the
 # elimination, N^2 of a dense system of N beads; beyond the cache the elimination waits for its matrix
@@ -57,8 +58,8 @@ WAITS = 3.0
 PATIENCE = 0.1  # of the coupling timeout, that a step of the fibers may take: some take ten times the mean
 ATTEMPTS = 1.5  # steps of implicit and auto in a step of the flow, of all fibers in the mean
 
-START, START_ALONE = 3.5, 2.5  # programs and kernels, of two sides and of one
-PREPARED = 2e-6  # initial field and mesh, for each cell
+START, START_ALONE = 2.0, 1.5  # programs and kernels, of two sides and of one
+PREPARED, PREPARED_ALONE = 4e-6, 1e-6  # initial field and mesh, for each cell; without a mesh
 DISK, RECORD = 200e6, 2e-3  # bytes a second into time folders; seconds of a record
 
 # bytes at their highest: of programs without cells and beads, a cell, a bead, and N^2 of a fiber of N beads with rpy
@@ -92,13 +93,16 @@ def cost(scene: Scene, slower: float | None = None) -> Cost:
     cells, beads = math.prod(scene.cells or (0,)), sum(f.count * f.beads for f in scene.families)
     flow = _flow(scene, cells, steps)
     step = None if flow is None else flow / max(steps, 1)
-    daemon = DAEMON + TAKEN * beads + sum(FAMILY + _moved(f, scene) for f in scene.families)
+    alone = scene.application == SPECTRAL
+    daemon = (
+        (ALONE if alone else DAEMON) + TAKEN * beads + sum(FAMILY + _moved(f, scene) for f in scene.families)
+    )
     sampling = _sampled(scene, cells, beads)
     hidden, sampled = _hidden(scene, step or 0.0, daemon, sampling)
-    alone = scene.application == SPECTRAL
+    begin = START_ALONE + PREPARED_ALONE * cells if alone else START + PREPARED * cells
     disk = needed(scene)
     parts = {
-        "start": slower * ((START_ALONE if alone else START) + PREPARED * cells),
+        "start": slower * begin,
         "flow": None if flow is None else slower * flow,
         "fibers": slower * steps * (daemon - hidden),
         "coupling": slower * steps * (sampling - sampled),
