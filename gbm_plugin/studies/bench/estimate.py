@@ -38,7 +38,7 @@ from ..study import steps as progress
 
 DEFAULT = ("default", "quick", "pimpleFoam", "flow-I", "taylor-green")
 FLOWS = ("openfoam", SPECTRAL)
-LEAST = 10  # steps
+LEAST = 30  # steps
 START = 5  # steps that are corrected
 UNDISTURBED = 0.25  # of the steps of the daemon, which has no clock but that of the wall
 
