@@ -197,7 +197,8 @@ SOLVER_FAULTS_IN_FILES = {"two in one": (lambda s: s.raw(2 * s.sample(4).encode(
 @pytest.mark.parametrize(
     "transport, fault",
     [("socket", fault) for fault in SOLVER_FAULTS]
-    + [("tcp", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, "half a message, then silence")]
+    + [("tcp", fault) for fault in ("truncated", "half a message, then silence")]
+    + [pytest.param("tcp", fault, marks=pytest.mark.exhaustive) for fault in SOLVER_FAULTS_ELSEWHERE[1:]]
     + [("file", fault) for fault in (*SOLVER_FAULTS_ELSEWHERE, *SOLVER_FAULTS_IN_FILES)],
 )
 def test_daemon_with_a_solver_that_is(transport, fault, copy):

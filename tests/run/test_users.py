@@ -120,7 +120,9 @@ def test_what_mpirun_says_is_shown(case, tmp_path):
     assert "ended with exit code 7 and said last 'mpiexec: cannot find hydra_pmi_proxy'" in done.stderr
 
 
-@pytest.mark.parametrize("beginning", ["pressure", "mean velocity"])
+@pytest.mark.parametrize(
+    "beginning", [pytest.param("pressure", marks=pytest.mark.exhaustive), "mean velocity"]
+)
 def test_a_fluid_at_rest(beginning, tmp_path):
     """Row 17: u is zero, or rounding of it; or begins to move in the first step."""
     case = make_case(tmp_path / "case", cells=8, steps=10, time_step=4e-4, prepared=False, tight=False)

@@ -11,7 +11,7 @@ from conftest import DEFAULT_CASE, gbm
 pytestmark = pytest.mark.openfoam
 
 
-@pytest.mark.parametrize("ranks, daemons", [(1, 1), (2, 2)])
+@pytest.mark.parametrize("ranks, daemons", [pytest.param(1, 1, marks=pytest.mark.exhaustive), (2, 2)])
 def test_shares_of_a_step(tmp_path, ranks, daemons):
     file = tmp_path / "bench.json"
     sizes = ("--cells", 24, "--fibers", 6, "--beads", 5, "--steps", 9, "--ranks", ranks, "--daemons", daemons)
