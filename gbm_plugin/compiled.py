@@ -32,6 +32,8 @@ PACKAGE = Path(__file__).parent
 # runs without Python's lock; divisions do not look for a zero, which would cost a branch each
 part = njit(nogil=True, error_model="numpy")
 inlined = njit(nogil=True, error_model="numpy", forceinline=True)
+# without counting who refers to an array, which costs more than the little that these do: they make and return none
+bare = njit(nogil=True, error_model="numpy", _nrt=False)
 woven = njit(nogil=True, error_model="numpy", inline="always")  # into the kernel, before types are known
 
 

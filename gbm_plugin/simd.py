@@ -1,7 +1,8 @@
-"""A Numba number type that holds eight numbers, one value for each of eight fibers, or eight in a row of a field:
+"""Numba number types that hold a line of the cache, one value for each of eight fibers, or eight in a row of a field:
 kernels read like scalar code, and every operation is one vector instruction (or two or four on narrower machines).
 
-Arrays that kernels work on have the lanes last and contiguous: shape (rows, LANES).
+Arrays that kernels work on have the lanes last and contiguous: shape (rows, LANES), with LANES = 8 in double
+precision, and (rows, 16) in single.
 
 Formulas without loops or branches are plain Python functions marked `@arithmetic`. A kernel that calls one is
 compiled with its instructions in place: the function is run once on symbols, whose operators write them. Numba
@@ -19,35 +20,40 @@ from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import PrimitiveModel
 from numba.extending import intrinsic, lower_builtin, register_model, type_callable
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-LANES = 8
 LINE = 64  # bytes of a line of the cache: an instruction that crosses its border takes twice as long
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+LANES = LINE // 8
 _FUSE = ("contract",)  # multiply and add may become one instruction; NaN and signed zero keep their meaning
 
 
 class LanesType(types.Type):
-    """Numba type of one float64 per lane."""
+    """Numba type of one number of type `real` per lane."""
 
-    def __init__(self):
-        super().__init__(name=f"lanes{LANES}")
+    def __init__(self, real: types.Float):
+        self.real, self.count = real, LINE * 8 // real.bitwidth
+        self.vector = ir.VectorType(ir.DoubleType() if real.bitwidth == 64 else ir.FloatType(), self.count)
+        super().__init__(name=f"lanes{self.count}")
 
 
-lanes = LanesType()
+lanes, lanes_single = LanesType(types.float64), LanesType(types.float32)
+_OF = {kind.real: kind for kind in (lanes, lanes_single)}
 
 
 @register_model(LanesType)
 class _LanesModel(PrimitiveModel):
     def __init__(self, manager, fe_type):
-        super().__init__(manager, fe_type, _VECTOR)
+        super().__init__(manager, fe_type, fe_type.vector)
 
 
-def _splat(builder, scalar):
-    nothing = ir.Constant(ir.VectorType(scalar.type, LANES), ir.Undefined)
-    vector = builder.insert_element(nothing, scalar, ir.Constant(ir.IntType(32), 0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), LANES), None)
-    return builder.shuffle_vector(vector, nothing, zeros)
+def _splat(builder, scalar, vector):
+    undefined = ir.Constant(vector, ir.Undefined)
+    first = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, undefined, _places([0] * vector.count))
+
+
+def _places(numbers):
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(numbers)), list(numbers))
 
 
 class _Symbol:
@@ -56,20 +62,23 @@ class _Symbol:
     Without a builder nothing is written: so the shape of a function's result is found.
     """
 
-    def __init__(self, builder, value):
-        self.builder, self.value = builder, value
+    def __init__(self, builder, value, kind):
+        self.builder, self.value, self.kind = builder, value, kind
 
     def _of(self, number):
         """number (a symbol, or the same constant in every lane) as a vector."""
         if isinstance(number, _Symbol):
             return number.value
-        return ir.Constant(_VECTOR, [float(number)] * LANES)
+        return ir.Constant(self.kind.vector, [float(number)] * self.kind.count)
+
+    def _new(self, value):
+        return _Symbol(self.builder, value, self.kind)
 
     def _write(self, instruction, *operands, **options):
         if self.builder is None:
             return self
         operands = [self._of(number) for number in operands]
-        return _Symbol(self.builder, getattr(self.builder, instruction)(*operands, **options))
+        return self._new(getattr(self.builder, instruction)(*operands, **options))
 
     def __add__(self, other):
         return self._write("fadd", self, other, flags=_FUSE)
@@ -102,59 +111,70 @@ class _Symbol:
         """Square root in every lane."""
         if self.builder is None:
             return self
-        function = cgutils.get_or_insert_function(
-            self.builder.module, ir.FunctionType(_VECTOR, [_VECTOR]), f"llvm.sqrt.v{LANES}f64"
-        )
-        return _Symbol(self.builder, self.builder.call(function, [self.value]))
+        name = f"llvm.sqrt.v{self.kind.count}f{self.kind.real.bitwidth}"
+        form = ir.FunctionType(self.kind.vector, [self.kind.vector])
+        function = cgutils.get_or_insert_function(self.builder.module, form, name)
+        return self._new(self.builder.call(function, [self.value]))
 
     def select_less(self, left, right, then, otherwise):
         """then in the lanes where left < right, else otherwise."""
         if self.builder is None:
             return self
         less = self.builder.fcmp_ordered("<", self._of(left), self._of(right))
-        return _Symbol(self.builder, self.builder.select(less, self._of(then), self._of(otherwise)))
+        return self._new(self.builder.select(less, self._of(then), self._of(otherwise)))
 
 
-def _symbols(builder, kind, value):
-    """An argument of a kernel's call as symbols: of lanes, a number (the same in all lanes), or tuples of these."""
-    if isinstance(kind, types.BaseTuple):
-        parts = [None] * len(kind) if builder is None else cgutils.unpack_tuple(builder, value)
-        return tuple(_symbols(builder, k, part) for k, part in zip(kind, parts, strict=True))
-    if isinstance(kind, types.Float) and builder is not None:
-        value = _splat(builder, value)
-    elif not isinstance(kind, LanesType | types.Float):
-        raise TypeError(f"arithmetic of lanes takes lanes and floats, not {kind}")
-    return _Symbol(builder, value)
-
-
-def _kind(result):
-    """Numba type of the result of a function of symbols."""
-    if isinstance(result, tuple):
-        return types.BaseTuple.from_types([_kind(part) for part in result])
+def _kind_of(kinds):
+    """The type of lanes among the types of a call's arguments; that of double precision where there is none."""
+    for kind in kinds:
+        found = _kind_of(kind) if isinstance(kind, types.BaseTuple) else kind
+        if found is lanes_single:
+            return lanes_single
     return lanes
 
 
-def _values(context, builder, kind, result):
+def _symbols(context, builder, kind, value, wanted):
+    """An argument of a kernel's call as symbols: of lanes, a number (the same in all lanes), or tuples of these."""
+    if isinstance(kind, types.BaseTuple):
+        parts = [None] * len(kind) if builder is None else cgutils.unpack_tuple(builder, value)
+        return tuple(_symbols(context, builder, k, part, wanted) for k, part in zip(kind, parts, strict=True))
+    if isinstance(kind, types.Float) and builder is not None:
+        value = _splat(builder, context.cast(builder, value, kind, wanted.real), wanted.vector)
+    elif not isinstance(kind, LanesType | types.Float):
+        raise TypeError(f"arithmetic of lanes takes lanes and floats, not {kind}")
+    return _Symbol(builder, value, wanted)
+
+
+def _type_of(result, wanted):
+    """Numba type of the result of a function of symbols."""
     if isinstance(result, tuple):
-        parts = [_values(context, builder, k, part) for k, part in zip(kind, result, strict=True)]
+        return types.BaseTuple.from_types([_type_of(part, wanted) for part in result])
+    return wanted
+
+
+def _values(context, builder, kind, result, wanted):
+    if isinstance(result, tuple):
+        parts = [_values(context, builder, k, part, wanted) for k, part in zip(kind, result, strict=True)]
         return context.make_tuple(builder, kind, parts)
-    return _Symbol(builder, None)._of(result)
+    return _Symbol(builder, None, wanted)._of(result)
 
 
 def arithmetic(function):
     """function, such that kernels can call it too: with lanes, floats and tuples of them."""
 
     def typer(*kinds):
-        return _kind(function(*(_symbols(None, kind, None) for kind in kinds)))
+        wanted = _kind_of(kinds)
+        return _type_of(function(*(_symbols(None, None, kind, None, wanted) for kind in kinds)), wanted)
 
     typer.__signature__ = inspect.signature(function)
     type_callable(function)(lambda context: typer)
 
     @lower_builtin(function, types.VarArg(types.Any))
     def lower(context, builder, signature, arguments):
+        wanted = _kind_of(signature.args)
         given = zip(signature.args, arguments, strict=True)
-        result = function(*(_symbols(builder, kind, value) for kind, value in given))
-        return _values(context, builder, signature.return_type, result)
+        result = function(*(_symbols(context, builder, kind, value, wanted) for kind, value in given))
+        return _values(context, builder, signature.return_type, result, wanted)
 
     return function
 
@@ -165,7 +185,7 @@ def _operator(function, arguments):
 
     def typer(*kinds):
         if any(isinstance(kind, LanesType) for kind in kinds) and all(isinstance(k, numbers) for k in kinds):
-            return lanes
+            return _kind_of(kinds)
 
     typer.__signature__ = inspect.Signature(
         [inspect.Parameter(name, inspect.Parameter.POSITIONAL_ONLY) for name in "ab"[:arguments]]
@@ -174,11 +194,13 @@ def _operator(function, arguments):
 
     def lower(context, builder, signature, values):
         given = zip(signature.args, values, strict=True)
-        return function(*(_symbols(builder, kind, value) for kind, value in given)).value
+        wanted = _kind_of(signature.args)
+        return function(*(_symbols(context, builder, kind, value, wanted) for kind, value in given)).value
 
-    pairs = [(lanes,)] if arguments == 1 else [(lanes, lanes), (lanes, types.Float), (types.Float, lanes)]
-    for kinds in pairs:
-        lower_builtin(function, *kinds)(lower)
+    for kind in _OF.values():
+        pairs = [(kind,)] if arguments == 1 else [(kind, kind), (kind, types.Float), (types.Float, kind)]
+        for kinds in pairs:
+            lower_builtin(function, *kinds)(lower)
 
 
 for _function in (operator.add, operator.sub, operator.mul, operator.truediv):
@@ -222,27 +244,29 @@ def smaller(left, right):
 # arrays of lanes, and of tuples of so many lanes
 
 
-def blank(*shape: int) -> NDArray:
-    """Zeros (*shape, LANES), every row of lanes in one line of the cache."""
-    size = math.prod(shape) * LANES
-    room = np.zeros(size + LINE // 8)
-    first = -room.ctypes.data % LINE // 8
-    return room[first : first + size].reshape(*shape, LANES)
+def blank(*shape: int, kind: DTypeLike = float) -> NDArray:
+    """Zeros (*shape, LANES), (*shape, 16) of single precision, every row of lanes in one line of the cache."""
+    count = LINE // np.dtype(kind).itemsize
+    size = math.prod(shape) * count
+    room = np.zeros(size + count, kind)
+    first = -room.ctypes.data % LINE // room.itemsize
+    return room[first : first + size].reshape(*shape, count)
 
 
 def _pointers(context, builder, array_type, array, i, count):
     """Where the rows of tuple i of an array of tuples of count lanes are."""
     data = context.make_array(array_type)(context, builder, array).data
-    first = builder.mul(i, ir.Constant(i.type, count * LANES))
+    kind = _OF[array_type.dtype]
+    first = builder.mul(i, ir.Constant(i.type, count * kind.count))
     for c in range(count):
-        at = builder.add(first, ir.Constant(i.type, c * LANES))
-        yield builder.bitcast(builder.gep(data, [at]), _VECTOR.as_pointer())
+        at = builder.add(first, ir.Constant(i.type, c * kind.count))
+        yield builder.bitcast(builder.gep(data, [at]), kind.vector.as_pointer())
 
 
 def _load(count):
     @intrinsic
     def load(typingctx, array, i):
-        kind = lanes if count == 1 else types.UniTuple(lanes, count)
+        kind = _OF[array.dtype] if count == 1 else types.UniTuple(_OF[array.dtype], count)
 
         def codegen(context, builder, signature, args):
             values = [builder.load(at, align=8) for at in _pointers(context, builder, array, *args, count)]
@@ -256,7 +280,7 @@ def _load(count):
 def _store(count):
     @intrinsic
     def store(typingctx, array, i, value):
-        kind = lanes if count == 1 else types.UniTuple(lanes, count)
+        kind = _OF[array.dtype] if count == 1 else types.UniTuple(_OF[array.dtype], count)
 
         def codegen(context, builder, signature, args):
             values = [args[2]] if count == 1 else cgutils.unpack_tuple(builder, args[2], count)
@@ -281,25 +305,138 @@ def load_part(typingctx, array, at, first, last):
     in the other lanes, of whose places nothing is read."""
 
     kind = ir.DoubleType() if array.dtype == types.float64 else ir.FloatType()
+    numbers_type, vector = ir.VectorType(ir.IntType(64), LANES), ir.VectorType(kind, LANES)
     name = f"llvm.masked.load.v{LANES}f{array.dtype.bitwidth}.p0"
 
     def codegen(context, builder, signature, args):
         array_, at, first, last = args
         data = context.make_array(array)(context, builder, array_).data
-        vector = ir.VectorType(kind, LANES)
         place = builder.bitcast(builder.gep(data, [at]), vector.as_pointer())
-        numbers = ir.Constant(ir.VectorType(at.type, LANES), list(range(LANES)))
+        numbers = ir.Constant(numbers_type, list(range(LANES)))
         wanted = builder.and_(
-            builder.icmp_signed(">=", numbers, _splat(builder, first)),
-            builder.icmp_signed("<", numbers, _splat(builder, last)),
+            builder.icmp_signed(">=", numbers, _splat(builder, first, numbers_type)),
+            builder.icmp_signed("<", numbers, _splat(builder, last, numbers_type)),
         )
         align, none = ir.Constant(ir.IntType(32), array.dtype.bitwidth // 8), ir.Constant(vector, None)
         function = ir.FunctionType(vector, [place.type, align.type, wanted.type, vector])
         call = cgutils.get_or_insert_function(builder.module, function, name)
         value = builder.call(call, [place, align, wanted, none])
-        return value if kind == ir.DoubleType() else builder.fpext(value, _VECTOR)
+        return value if kind == ir.DoubleType() else builder.fpext(value, lanes.vector)
 
     return lanes(array, types.intp, types.intp, types.intp), codegen
+
+
+def _prefetch(write):
+    @intrinsic
+    def prefetch(typingctx, array, i):
+        def codegen(context, builder, signature, args):
+            place = next(_pointers(context, builder, signature.args[0], *args, 1))
+            line = builder.bitcast(place, ir.IntType(8).as_pointer())
+            number = ir.IntType(32)
+            how = [number(int(write)), number(2), number(1)]  # into the second level, of data
+            form = ir.FunctionType(ir.VoidType(), [line.type, *3 * [number]])
+            function = cgutils.get_or_insert_function(builder.module, form, "llvm.prefetch.p0")
+            builder.call(function, [line, *how])
+            return context.get_dummy_value()
+
+        return types.void(array, types.intp), codegen
+
+    return prefetch
+
+
+# have row i of an array of lanes brought near, to be read or to be written soon
+prefetch, prefetch_to_write = _prefetch(False), _prefetch(True)
+
+
+@intrinsic
+def transpose(typingctx, source, first, step, target, into, stride):
+    """As many rows of lanes as there are lanes, from row `first` of source on, every `step`: their lanes become rows of
+    target, from `into` on, every `stride`."""
+    kind = _OF[source.dtype]
+
+    def codegen(context, builder, signature, args):
+        def at(which, start, step):
+            array, first, step = (args[i] for i in (which, start, step))
+            for r in range(kind.count):
+                row = builder.add(first, builder.mul(step, ir.Constant(step.type, r)))
+                yield from _pointers(context, builder, signature.args[which], array, row, 1)
+
+        rows = [builder.load(place, align=LINE // kind.count) for place in at(0, 1, 2)]
+        every, bit = range(kind.count), 1
+        while bit < kind.count:  # rows and lanes change places, a binary digit of their numbers at a time
+            swapped = list(rows)
+            for r in every:
+                if not r & bit:
+                    low, high = rows[r], rows[r | bit]
+                    evens = [kind.count + (s ^ bit) if s & bit else s for s in every]
+                    odds = [kind.count + s if s & bit else s | bit for s in every]
+                    swapped[r] = builder.shuffle_vector(low, high, _places(evens))
+                    swapped[r | bit] = builder.shuffle_vector(low, high, _places(odds))
+            rows, bit = swapped, 2 * bit
+        for place, row in zip(at(3, 4, 5), rows, strict=True):
+            builder.store(row, place, align=LINE // kind.count)
+        return context.get_dummy_value()
+
+    return types.void(source, types.intp, types.intp, target, types.intp, types.intp), codegen
+
+
+# so many complex numbers of a C-contiguous array, from its element i on, as their real and imaginary parts in lanes
+
+
+def _some(context, builder, array_type, array, i, count):
+    """For the two rows of lanes that hold complex numbers from element i on: where they are, and in which lanes."""
+    kind = _OF[array_type.dtype.underlying_float]
+    data = context.make_array(array_type)(context, builder, array).data
+    first = builder.bitcast(builder.gep(data, [i]), kind.vector.as_pointer())
+    numbers = ir.VectorType(i.type, kind.count)
+    last = _splat(builder, builder.shl(count, ir.Constant(count.type, 1)), numbers)
+    for row in range(2):
+        lanes_of_row = ir.Constant(numbers, [row * kind.count + s for s in range(kind.count)])
+        place = builder.gep(first, [ir.Constant(ir.IntType(32), row)])
+        yield place, builder.icmp_signed("<", lanes_of_row, last)
+
+
+def _masked(builder, name, kind, result, *arguments):
+    form = ir.FunctionType(result, [argument.type for argument in arguments])
+    name = f"llvm.masked.{name}.v{kind.count}f{kind.real.bitwidth}.p0"
+    return builder.call(cgutils.get_or_insert_function(builder.module, form, name), arguments)
+
+
+@intrinsic
+def load_complex(typingctx, array, i, count):
+    """Real and imaginary parts of `count` numbers, no more than there are lanes; 0 in the other lanes."""
+    kind = _OF[array.dtype.underlying_float]
+
+    def codegen(context, builder, signature, args):
+        align, none = ir.Constant(ir.IntType(32), kind.real.bitwidth // 8), ir.Constant(kind.vector, None)
+        low, high = (
+            _masked(builder, "load", kind, kind.vector, place, align, mask, none)
+            for place, mask in _some(context, builder, signature.args[0], *args)
+        )
+        parts = [
+            builder.shuffle_vector(low, high, _places(range(part, 2 * kind.count, 2))) for part in (0, 1)
+        ]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(kind, 2)(array, types.intp, types.intp), codegen
+
+
+@intrinsic
+def store_complex(typingctx, array, i, count, value):
+    """The opposite of `load_complex`; value: real and imaginary parts."""
+    kind = _OF[array.dtype.underlying_float]
+
+    def codegen(context, builder, signature, args):
+        align = ir.Constant(ir.IntType(32), kind.real.bitwidth // 8)
+        re, im = cgutils.unpack_tuple(builder, args[3], 2)
+        for row, (place, mask) in enumerate(_some(context, builder, signature.args[0], *args[:3])):
+            lanes_of_row = range(row * kind.count // 2, (row + 1) * kind.count // 2)
+            numbers = _places([kind.count * part + s for s in lanes_of_row for part in (0, 1)])
+            values = builder.shuffle_vector(re, im, numbers)
+            _masked(builder, "store", kind, ir.VoidType(), values, place, align, mask)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, types.UniTuple(kind, 2)), codegen
 
 
 # three-vectors are tuples of three lane numbers

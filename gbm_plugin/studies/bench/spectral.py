@@ -14,9 +14,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-import pyfftw
+from scipy.fft import rfftn
 
 from gbm_plugin.spectral import SpectralSolver
+from gbm_plugin.spectral.transform import repeat
 
 from ..study import option
 
@@ -161,35 +162,23 @@ def _right_hand_side(cells: int, threads: int, precision: str) -> tuple[Spectral
 
 
 def _transforms_alone(solver: SpectralSolver) -> Callable[[], float]:
-    """All transforms of one right-hand side, on buffers at rest."""
+    """All transforms of one right-hand side, of columns that lie in the cache."""
     operators = solver.operators
+    blocks, groups = len(operators._works[0].x), operators._works[0].lines.shape[1]
+    along_x = 8 * len(solver.modes.rows) * blocks
+    along_y, along_z = 8 * solver.cells * blocks, 4 * solver.cells * groups
+    for work in operators._works:
+        work.x[:] = work.y[:] = 0
 
-    def columns(worker, first, last):
-        worker.inverse_x.execute()
-        worker.forward_x.execute()
+    def part(work, start, stop):
+        repeat(work.x[0], work.y[0, 0], work.forward, stop - start)
 
-    def planes(worker, first, buffers):
-        worker.inverse(len(buffers))
-        worker.forward(len(buffers))
-
-    def once() -> float:
-        for worker in operators._workers:
-            worker.columns[:] = 0
-            worker.planes[:] = 0
-        start = time.perf_counter()
-        operators._each_column_block(columns)
-        operators._each_block(planes)
-        return time.perf_counter() - start
-
-    return once
+    return _timed(lambda: operators._share(along_x + along_y + along_z, part))
 
 
 def _full_transforms(cells: int, threads: int, precision: str) -> Callable[[], float]:
-    real, kind = ("float64", "complex128") if precision == "double" else ("float32", "complex64")
-    a = pyfftw.zeros_aligned((cells,) * 3, real)
-    b = pyfftw.zeros_aligned((cells, cells, cells // 2 + 1), kind)
-    forward = pyfftw.FFTW(a, b, axes=(0, 1, 2), threads=threads, flags=("FFTW_MEASURE",))
-    return _timed(lambda: [forward.execute() for _ in range(9)])
+    field = np.zeros((cells,) * 3, "float64" if precision == "double" else "float32")
+    return _timed(lambda: [rfftn(field, workers=threads) for _ in range(9)])
 
 
 def _timed(work: Callable) -> Callable[[], float]:
