@@ -34,6 +34,7 @@ part = njit(nogil=True, error_model="numpy")
 inlined = njit(nogil=True, error_model="numpy", forceinline=True)
 # without counting who refers to an array, which costs more than the little that these do: they make and return none
 bare = njit(nogil=True, error_model="numpy", _nrt=False)
+bare_inlined = njit(nogil=True, error_model="numpy", _nrt=False, forceinline=True)
 woven = njit(nogil=True, error_model="numpy", inline="always")  # into the kernel, before types are known
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import bare, kernel
+from ..compiled import bare, bare_inlined, kernel
 from ..simd import arithmetic, load, store
 
 HALF_ROOT = 0.75**0.5
@@ -104,7 +104,7 @@ def butterfly4(a, b, c, d):
     )
 
 
-@bare
+@bare_inlined
 def pass2(x, y, s, m, w, t):
     """The pass of radix 2, with twiddle factors w (m, 2)."""
     for p in range(m):
@@ -116,7 +116,7 @@ def pass2(x, y, s, m, w, t):
             put(y, o + s, times(b, turn))
 
 
-@bare
+@bare_inlined
 def pass3(x, y, s, m, w, t, first):
     """The pass of radix 3, with twiddle factors w (2m, 2); first: where the first harmonic goes, 1, or backward 2."""
     one, two = first, 3 - first
@@ -131,7 +131,7 @@ def pass3(x, y, s, m, w, t, first):
             put(y, o + two * s, times(c, turn_c))
 
 
-@bare
+@bare_inlined
 def pass4(x, y, s, m, w, t, first):
     """The pass of radix 4, with twiddle factors w (3m, 2); first: where the first harmonic goes, 1, or backward 3."""
     one, three = first, 4 - first
@@ -148,7 +148,7 @@ def pass4(x, y, s, m, w, t, first):
             put(y, o + three * s, times(d, turn_d))
 
 
-@bare
+@bare_inlined
 def pass_any(x, y, s, m, w, t, r):
     """The pass of any other radix r, with its roots of unity before its twiddle factors in w (r + (r - 1) m, 2)."""
     for p in range(m):
