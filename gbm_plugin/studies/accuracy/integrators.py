@@ -96,8 +96,8 @@ def _moved(carrier: Carrier, fibers, end: float, mobility: str, step: float, nam
 
 
 def draw(axes, rows: list[dict]) -> None:
-    """Error of the ends against time in free drain at the shorter step; the default is framed, the front dashed."""
-    shown = [r for r in rows if r["mobility"] == "freeDrain" and r["step"] == rows[-1]["step"]]
+    """Error of the ends against time in free drain, at all steps; the default is framed, the front dashed."""
+    shown = [r for r in rows if r["mobility"] == "freeDrain"]
     names = list(dict.fromkeys(r["integrator"] for r in shown))
     flow = shown[-1]["flow"]
     for marker, regime in zip("osD", REGIMES, strict=False):
@@ -108,12 +108,19 @@ def draw(axes, rows: list[dict]) -> None:
             for r in own:
                 if r["default"]:
                     axes.plot(r["microseconds"], r["error"], "ks", markersize=9, fillstyle="none")
-        draw_front(axes, [r for r in shown if (r["flow"], r["regime"]) == (flow, regime)], "microseconds")
+        for step in dict.fromkeys(r["step"] for r in shown):
+            own = [r for r in shown if (r["flow"], r["regime"], r["step"]) == (flow, regime, step)]
+            draw_front(axes, own, "microseconds")
         axes.plot([], [], marker, color="0.4", linestyle="", label=regime)
     for colour, name in zip(COLOURS, names, strict=False):
         axes.plot([], [], color=colour, label=name)
     axes.plot([], [], "--", color="0.6", linewidth=2, label="front")
-    axes.set(title=f"integrators, {flow}", xlabel="µs a bead and τ", ylabel="error of the ends / L")
+    listed = ", ".join(f"{step:g}" for step in dict.fromkeys(r["step"] for r in shown))
+    axes.set(
+        title=f"integrators, {flow}, steps of {listed} τ",
+        xlabel="µs a bead and τ",
+        ylabel="error of the ends / L",
+    )
     axes.legend(fontsize=7)
 
 
