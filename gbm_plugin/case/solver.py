@@ -73,9 +73,16 @@ def face_values(case: Path) -> tuple[str, str]:
 
 def _scheme(group: Dictionary, name: str) -> str:
     """What OpenFOAM finds for a name, or a pattern of it, or the default."""
-    patterns = [n for n in reversed(group.names) if n != name and re.fullmatch(n, name)]
+    patterns = [n for n in reversed(group.names) if n != name and _matches(group, n, name)]
     found = next((n for n in (name, *patterns, "default") if n in group), None)
     return str(group.raw(found)) if found else ""
+
+
+def _matches(group: Dictionary, pattern: str, name: str) -> bool:
+    try:
+        return re.fullmatch(pattern, name) is not None
+    except re.error as error:
+        raise group.fail(pattern, f"is no pattern of names: {error}") from None
 
 
 def _differences(case: Path) -> str:

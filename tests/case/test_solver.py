@@ -10,7 +10,7 @@ from gbm_plugin.case.scene import read_scene
 from gbm_plugin.case.solver import DIFFERENCES, face_values, scheme, stable_courant
 from gbm_plugin.errors import CaseError
 
-from conftest import make_case, set_entry
+from conftest import HEADER, make_case, set_entry
 
 
 @pytest.fixture
@@ -71,3 +71,11 @@ def test_face_values_are_those_that_openfoam_finds(tmp_path):
     assert found("default Gauss cubic;", pattern) == ("cubic", "cubic")
     assert found("default Gauss linear;", f"flux(HbyA) linear; {pattern}") == ("linear", "linear")
     assert found("default Gauss linear;", f'{pattern} "flux.H.*" linear;') == ("linear", "linear")
+
+
+def test_a_pattern_that_is_none_is_named(tmp_path):
+    (tmp_path / "system").mkdir()
+    words = 'gradSchemes { "(grad" Gauss linear; } interpolationSchemes { default linear; }'
+    (tmp_path / "system/fvSchemes").write_text(HEADER + words)
+    with pytest.raises(CaseError, match=r"gradSchemes.*'\(grad' is no pattern of names"):
+        face_values(tmp_path)
