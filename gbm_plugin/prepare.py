@@ -9,6 +9,7 @@ import numpy as np
 from .fiber import Fibers, instant_rates
 from .fiber import prepare as prepare_fibers
 from .fiber.model import MOBILITIES
+from .fleet.own import prepare as prepare_own
 from .flow import TaylorGreen, grid
 from .spectral import LinearForcing, SpectralSolver
 from .spectral.interpolation import WORDS
@@ -19,6 +20,7 @@ def prepare() -> None:
     for integrator, mobility in itertools.product(("ab3", "implicit"), MOBILITIES):
         prepare_fibers(True, integrator=integrator, mobility=mobility)
     prepare_fibers(mobility="rpy", strain_coupling=True, repulsion=1.0)
+    prepare_own()
     fibers = Fibers.straight(1, 3, 1.0, 1.0, 1.0)
     for mobility in MOBILITIES:
         instant_rates(fibers, 0.0, 0.0, mobility)

@@ -23,6 +23,7 @@ from ..files import replaced
 from ..sampling import gradient_of
 from ..statistics.fibers import end_to_end_squared_ratio
 from .own import CENTRAL2, CENTRAL6, SHELLS, Mesh, OwnDisturbance, kernels
+from .own import prepare as prepare_own
 
 log = logging.getLogger(__name__)
 
@@ -46,6 +47,8 @@ def prepare_kernels(families: Sequence[Family], feedback: bool = False) -> None:
     """All that these families will call is compiled when this returns: in a step somebody waits."""
     for options in {tuple(f.model.motion.items()) for f in families}:
         prepare(feedback, **dict(options))
+    if feedback:
+        prepare_own()
 
 
 class Fleet(Group):

@@ -37,7 +37,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import inlined, kernel, only_read, part_of
+from ..threads import in_shares
+
 SHELLS = 10
+INTERVALS = 2048  # of slips, between which what is left after a step is interpolated: to 1e-6
+COST = 0.3  # of a bead, in steps of a bead
 WIDTHS = {"trilinear": 2, "cubic": 4, "quintic": 6}  # nodes in each direction
 CENTRAL2, CENTRAL6 = (
     (1.0,),
@@ -47,7 +52,6 @@ FACES = {
     "linear": (1 / 2,),
     "cubic": (9 / 16, -1 / 16),
 }  # weights of the cells on either side, the nearest first
-ADAMS_BASHFORTH = np.array([23.0, -16.0, 5.0]) / 12
 
 
 class Kernel(NamedTuple):
@@ -169,12 +173,59 @@ def _slopes(mesh: Mesh, phase: NDArray, seen: NDArray) -> tuple[NDArray, NDArray
 
 
 def _shared(left: NDArray, along: NDArray) -> NDArray:
-    """g of s/νk (M, B, 2), for forces and torques, of which so much (M, 1, 2) is along k."""
+    """g of s/νk (..., M, 2), for forces and torques, of which so much (M, 2) is along k."""
     q = np.maximum(left, 1e-3)  # below it g is 1 to 1e-6
     turned = np.arctan(q) / q
     across = 1.5 * ((1 + 1 / q**2) * turned - 1 / q**2)
     pushed = across + along * (3 * (1 - turned) / q**2 - across)
     return np.stack([pushed[..., 0], turned[..., 1]], axis=-1)
+
+
+@inlined
+def _add_motion(weight, parts, motion):
+    """motion (6,) += Σ weight parts of the shells (M, 6)."""
+    for m in range(parts.shape[0]):
+        for c in range(6):
+            motion[c] += weight[m, c // 3] * parts[m, c]
+
+
+@kernel
+def _sum(share, shares, weight, parts, motion):
+    """motion (B, 6) of parts (B, M, 6)."""
+    first, last = part_of(share, shares, parts.shape[0])
+    for b in range(first, last):
+        motion[b] = 0
+        _add_motion(weight, parts[b], motion[b])
+
+
+@kernel
+def _advance(share, shares, fades, half, drag, step, weight, loads, parts, motion):
+    """parts (B, M, 6) one step on, and motion (B, 6), by loads (S <= 3, B, 6), newest first; fades: `_fades`."""
+    first, last = part_of(share, shares, parts.shape[0])
+    for b in range(first, last):
+        x, y, z = loads[0, b, 0], loads[0, b, 1], loads[0, b, 2]
+        slip = np.sqrt(x * x + y * y + z * z) / drag
+        place = slip / (slip + half) * INTERVALS
+        if not place >= 0:  # no number: nor will the parts be
+            place = 0.0
+        i = min(int(place), INTERVALS - 1)
+        place -= i
+        for m in range(parts.shape[1]):
+            for kind in range(2):
+                fade = fades[i, m, kind] + place * (fades[i + 1, m, kind] - fades[i, m, kind])
+                if loads.shape[0] < 3:
+                    now = step / 6 * (fade + 4 * np.sqrt(fade) + 1)
+                    for c in range(3 * kind, 3 * kind + 3):
+                        parts[b, m, c] = fade * parts[b, m, c] + now * loads[0, b, c]
+                    continue
+                now = step * (23 / 12) * fade
+                before = -step * (16 / 12) * fade * fade
+                earlier = step * (5 / 12) * fade * fade * fade
+                for c in range(3 * kind, 3 * kind + 3):
+                    past = before * loads[1, b, c] + earlier * loads[2, b, c]
+                    parts[b, m, c] = fade * parts[b, m, c] + now * loads[0, b, c] + past
+        motion[b] = 0
+        _add_motion(weight, parts[b], motion[b])
 
 
 class OwnDisturbance:
@@ -183,42 +234,52 @@ class OwnDisturbance:
 
     def __init__(self, kernels: tuple[Kernel, Kernel], viscosity: float, drag: float, beads: int):
         self._viscosity, self._drag = viscosity, drag
-        self._weight, self._rate, self._along = (
-            np.stack(a, axis=1)[:, None, :, None] for a in zip(*kernels, strict=True)
-        )
-        self._parts = np.zeros((SHELLS, beads, 2, 3))
-        self._loads: list[NDArray] = []  # (B, 2, 3), newest first
+        self._weight, self._rate, self._along = (np.stack(a, axis=1) for a in zip(*kernels, strict=True))
+        self._parts = np.zeros((beads, SHELLS, 6))
+        self._loads = np.zeros((0, beads, 6))  # newest first
+        self._motion = np.zeros((beads, 6))
+        self._step, self._fades, self._half = 0.0, np.zeros(0), 0.0
 
     @property
     def motion(self) -> NDArray:
         """Velocity and rotation now, (B, 2, 3) [m/s, 1/s]."""
-        return (self._weight * self._parts).sum(axis=0)
+        return self._motion.reshape(-1, 2, 3)
+
+    def _tabulate(self, time_step: float) -> None:
+        """What a step leaves of the shells, (INTERVALS + 1, M, 2), at slips s with s/(s + half) in equal steps."""
+        slowness = np.sqrt(self._viscosity * self._rate)  # νk
+        self._step, self._half = time_step, float(slowness.max())
+        part = np.linspace(0, 1, INTERVALS + 1)[:-1, None, None]
+        left = self._half * part / (1 - part) / slowness
+        fades = np.exp(-time_step * self._rate / _shared(left, self._along))
+        self._fades = np.concatenate([fades, np.zeros((1, *fades.shape[1:]))])
 
     def advance(self, force: NDArray, torque: NDArray, time_step: float) -> None:
         """One step, at whose start the beads put these (B, 3) on the flow; all steps are equal."""
-        loads = np.stack([force, torque], axis=1)
-        self._loads = [loads, *self._loads][:3]
-        slip = np.linalg.norm(force, axis=1)[:, None] / self._drag
-        left = slip / np.sqrt(self._viscosity * self._rate[..., 0])  # s/νk, (M, B, 2)
-        fade = np.exp(-time_step * self._rate / _shared(left, self._along[..., 0])[..., None])
-        self._parts *= fade
-        if len(self._loads) < 3:
-            self._parts += time_step / 6 * (fade + 4 * np.sqrt(fade) + 1) * loads
-            return
-        for age, (weight, past) in enumerate(zip(ADAMS_BASHFORTH, self._loads, strict=True)):
-            self._parts += time_step * weight * fade ** (1 + age) * past
+        if time_step != self._step:
+            self._tabulate(time_step)
+        self._loads = np.concatenate([np.concatenate([force, torque], axis=1)[None], self._loads[:2]])
+        own = (self._fades, self._half, self._drag, time_step, self._weight, only_read(self._loads))
+        in_shares(_advance, COST * len(self._parts), *own, self._parts, self._motion)
 
     def state(self) -> NDArray:
         """(B, M + S, 6): the parts, and the loads of up to three steps."""
-        whole = np.concatenate([self._parts, np.array(self._loads).reshape(-1, *self._parts.shape[1:])])
-        return whole.reshape(*whole.shape[:2], 6).swapaxes(0, 1)
+        return np.concatenate([self._parts, self._loads.swapaxes(0, 1)], axis=1)
 
     def restore(self, state: NDArray) -> None:
         """Take back what state() gave. ValueError for another number of beads or shells."""
-        beads = self._parts.shape[1]
+        beads = len(self._parts)
         if state.shape[0] != beads or not SHELLS <= state.shape[1] <= SHELLS + 3 or state.shape[2:] != (6,):
             raise ValueError(
                 f"the own disturbance is {state.shape}; it must be ({beads}, {SHELLS} ... + 3, 6)"
             )
-        arrays = np.ascontiguousarray(state.swapaxes(0, 1)).reshape(-1, beads, 2, 3)
-        self._parts, self._loads = arrays[:SHELLS], list(arrays[SHELLS:])
+        self._parts = np.ascontiguousarray(state[:, :SHELLS], float)
+        self._loads = np.ascontiguousarray(state[:, SHELLS:].swapaxes(0, 1), float)
+        in_shares(_sum, COST * beads, self._weight, self._parts, self._motion)
+
+
+def prepare() -> None:
+    """Compile or load the kernels."""
+    own = OwnDisturbance((Kernel(*np.ones((3, SHELLS))),) * 2, 1.0, 1.0, 1)
+    own.advance(np.zeros((1, 3)), np.zeros((1, 3)), 1.0)
+    own.restore(own.state())

@@ -399,7 +399,10 @@ void Foam::functionObjects::fiberCoupling::receiveForces
     *feedback::exchange() = exchange/(nCells_*cellMass_);
 
     const scalarList own(beads_->distribute(std::move(loads), 6));
-    sampler_->spread(own, beads_(), feedback_->next());
+    sampler_->spread
+    (
+        own, beads_(), feedback_->next(), feedback_->nextFilled()
+    );
     feedback_->renewed(step_);
     t.spreading += watch.lap();
 }

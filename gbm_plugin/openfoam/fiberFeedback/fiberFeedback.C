@@ -114,6 +114,7 @@ void Foam::fv::fiberFeedback::renewed(const label step)
 {
     hasBefore_ = step_ != -1 || restarted_;
     before_.swap(force_.primitiveFieldRef());
+    filledBefore_.swap(filled_);
     force_.correctBoundaryConditions();
     step_ = step;
 }

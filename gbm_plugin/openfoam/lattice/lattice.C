@@ -1,4 +1,5 @@
 #include "lattice.H"
+#include <vector>
 
 namespace Foam
 {
@@ -73,7 +74,7 @@ void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
     slots_.setSize(extent_.x()*extent_.y()*extent_.z(), -1);
 
     Map<label> local(2*nCells);
-    List<char> near(slots_.size(), char(0));
+    std::vector<char> near(slots_.size(), char(0));
     for (label celli = 0; celli < nCells; ++celli)
     {
         const Vector<label> i(box_.place(celli));
@@ -85,8 +86,8 @@ void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
     // widened by some layers in one direction after the other
     for (direction d = 0; d < vector::nComponents; ++d)
     {
-        const List<char> inside(near);
-        forAll(inside, s)
+        const std::vector<char> inside(near);
+        forAll(slots_, s)
         {
             for (label m = -layers; inside[s] && m <= layers; ++m)
             {
@@ -98,7 +99,7 @@ void Foam::lattice::layOut(labelList& remoteSlots, labelList& remoteNumbers)
     DynamicList<label> slots;
     DynamicList<label> numbers;
 
-    forAll(near, s)
+    forAll(slots_, s)
     {
         if (near[s] && slots_[s] == -1)
         {
@@ -181,6 +182,50 @@ Foam::List<Foam::DynamicList<Foam::label>> Foam::lattice::candidates
     }
 
     return result;
+}
+
+
+void Foam::lattice::addBack
+(
+    const List<vector>& values,
+    vectorField& cellValues,
+    filledParts& filled
+) const
+{
+    if (!Pstream::parRun())
+    {
+        return;
+    }
+
+    PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
+    label start = 0;
+    forAll(received_, rank)
+    {
+        if (received_[rank])
+        {
+            UOPstream to(rank, buffers);
+            to << List<vector>(SubList<vector>(values, received_[rank], start));
+            start += received_[rank];
+        }
+    }
+    buffers.finishedSends();
+
+    forAll(sent_, rank)
+    {
+        if (sent_[rank].size())
+        {
+            UIPstream from(rank, buffers);
+            const List<vector> added(from);
+            forAll(added, i)
+            {
+                if (added[i] != vector::zero)
+                {
+                    filled.open(sent_[rank][i], 1, cellValues);
+                    cellValues[sent_[rank][i]] += added[i];
+                }
+            }
+        }
+    }
 }
 
 

@@ -105,92 +105,107 @@ void sampleWith
 typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
+#define AT(type, numbers) (*reinterpret_cast<type*>(numbers))
 
-//- target (+)= f a + g b
-template<int M, bool add>
-INLINE void combine
-(
-    double* target,
-    const double f,
-    const double* a,
-    const double g,
-    const double* b
-)
+
+//- M numbers in a row, in registers
+template<int M>
+struct inRow
 {
-    #define COMBINE(type, i)                                                   \
-    {                                                                          \
-        type& t = reinterpret_cast<type&>(target[i]);                          \
-        const type sum =                                                       \
-            f*reinterpret_cast<const type&>(a[i])                              \
-          + g*reinterpret_cast<const type&>(b[i]);                             \
-        t = add ? t + sum : sum;                                               \
-    }
     static_assert(M % 2 == 0, "pairs");
-    for (int i = 0; i + 4 <= M; i += 4) COMBINE(four, i)
-    if (M % 4) COMBINE(pair, M - 2)
-    #undef COMBINE
-}
 
+    four most[M/4];
+    pair rest;
 
-//- What 'spread' of sampler gives, in the order of the points
-template<class Interpolant>
-INLINE void spreadAll
-(
-    const Interpolant& interpolant,
-    const lattice& cells,
-    const beadExchange& beads,
-    const scalar* loads,
-    vector* own,
-    vector* neighbours,
-    const label nCells
-)
-{
-    constexpr int N = Interpolant::reach;
-    constexpr int below = Interpolant::below;
-    constexpr int outer = Interpolant::outer;
-    const auto weighted = [](const int m)
+    //- f a + g b
+    INLINE inRow(const double f, const double* a, const double g, const double* b)
+    :
+        rest{0, 0}
     {
-        return outer <= m && m < N - outer;
-    };
-    const vector perCell(cells.box().perCell());
-    const Vector<label> stride(cells.strides());
-    const label* slots = cells.slots().cdata();
-    const unsigned char* runs = cells.runs().cdata();
-    const stencil target{slots, runs, 0, stride, own, neighbours, nCells};
-
-    const UList<point>& points = beads.points();
-    vector next;
-    label nextSlot = points.size() ? cells.around(points[0], next) : 0;
-
-    forAll(points, bead)
-    {
-        const vector x(next);
-        const label slot =
-            nextSlot - below*(stride.x() + stride.y() + stride.z());
-        if (bead + 1 < points.size())
+        for (int i = 0; i < M/4; ++i)
         {
-            nextSlot = cells.around(points[bead + 1], next);
-            target.template fetch<N>(nextSlot, below);
+            most[i] = f*AT(const four, a + 4*i) + g*AT(const four, b + 4*i);
         }
-
-        double w[3][N], s[3][N];
-        for (direction d = 0; d < 3; ++d)
+        if (M % 4)
         {
-            interpolant.weights(x[d], w[d], s[d]);
+            rest = f*AT(const pair, a + M - 2) + g*AT(const pair, b + M - 2);
+        }
+    }
+
+    INLINE void operator+=(const inRow& other)
+    {
+        for (int i = 0; i < M/4; ++i)
+        {
+            most[i] += other.most[i];
+        }
+        rest += other.rest;
+    }
+
+    INLINE void store(double* row) const
+    {
+        for (int i = 0; i < M/4; ++i)
+        {
+            AT(four, row + 4*i) = most[i];
+        }
+        if (M % 4)
+        {
+            AT(pair, row + M - 2) = rest;
+        }
+    }
+
+    INLINE void addTo(double* row) const
+    {
+        for (int i = 0; i < M/4; ++i)
+        {
+            AT(four, row + 4*i) += most[i];
+        }
+        if (M % 4)
+        {
+            AT(pair, row + M - 2) += rest;
+        }
+    }
+};
+
+
+//- What the loads of a bead are to the cells around it: a row of cells along x
+//  gets w_y (w_z p + s_z r) + s_y w_z q
+template<int N>
+struct beadRows
+{
+    //- Slot of the lowest cell
+    label slot;
+
+    //- Weights of value and slope in y and z
+    double w[2][N], s[2][N];
+
+    //- Along x: the force with the couple x slope there, and what the slopes
+    //  in y and z multiply, couple x e_y and couple x e_z
+    double p[3*N], q[3*N], r[3*N];
+
+    template<class Interpolant>
+    INLINE void set
+    (
+        const Interpolant& interpolant,
+        const vector& x,
+        const vector& perCell,
+        const double* load
+    )
+    {
+        double along[N], slope[N];
+        interpolant.weights(x.x(), along, slope);
+        for (direction d = 0; d < 2; ++d)
+        {
+            interpolant.weights(x[d + 1], w[d], s[d]);
             for (int m = 0; m < N; ++m)
             {
-                s[d][m] *= perCell[d];
+                s[d][m] *= perCell[d + 1];
             }
         }
-        const scalar* load = loads + 6*beads.placeOf(bead);
-        const vector couple(0.5*load[3], 0.5*load[4], 0.5*load[5]);
 
-        // along x: the force with the couple x slope there, and what the
-        // slopes in y and z multiply, couple x e_y and couple x e_z
-        double p[3*N], q[3*N], r[3*N];
+        const vector couple(0.5*load[3], 0.5*load[4], 0.5*load[5]);
         for (int m = 0; m < N; ++m)
         {
-            const double v = w[0][m], d = s[0][m];
+            const double v = along[m], d = slope[m]*perCell.x();
             p[3*m] = v*load[0];
             p[3*m + 1] = v*load[1] + d*couple.z();
             p[3*m + 2] = v*load[2] - d*couple.y();
@@ -201,37 +216,128 @@ INLINE void spreadAll
             r[3*m + 1] = -v*couple.x();
             r[3*m + 2] = 0;
         }
+    }
+};
 
-        for (int k = 0; k < N; ++k)
+
+//- What 'spread' of sampler gives, in the order of the points
+template<class Interpolant>
+INLINE void spreadAll
+(
+    const Interpolant& interpolant,
+    const lattice& cells,
+    const beadExchange& beads,
+    const scalar* loads,
+    vectorField& own,
+    filledParts& filled,
+    vector* neighbours
+)
+{
+    constexpr int N = Interpolant::reach;
+    constexpr int below = Interpolant::below;
+    constexpr int outer = Interpolant::outer;
+    const auto inner = [](const int m)
+    {
+        return outer <= m && m < N - outer;
+    };
+    const vector perCell(cells.box().perCell());
+    const Vector<label> stride(cells.strides());
+    const label lowest = below*(stride.x() + stride.y() + stride.z());
+    const label* slots = cells.slots().cdata();
+    const unsigned char* runs = cells.runs().cdata();
+    const label nCells = own.size();
+    const stencil target
+    {
+        slots, runs, 0, stride, own.cdata(), neighbours, nCells
+    };
+    const UList<point>& points = beads.points();
+
+    // some beads at a time: their rows are in memory, and their cells have
+    // come from there, when they are added
+    constexpr label most = 8;
+    beadRows<N> some[most];
+    label last = -1;
+
+    for (label start = 0; start < points.size(); start += most)
+    {
+        const label count = min(most, points.size() - start);
+        for (label i = 0; i < count; ++i)
         {
-            double a[3*N], b[3*N];
-            combine<3*N, false>(a, w[2][k], p, s[2][k], r);
-            combine<3*N, false>(b, w[2][k], q, 0, q);
-
-            for (int j = 0; j < N; ++j)
+            vector x;
+            const label around = cells.around(points[start + i], x);
+            some[i].slot = around - lowest;
+            some[i].set
+            (
+                interpolant, x, perCell, loads + 6*beads.placeOf(start + i)
+            );
+            if (some[i].slot != (i ? some[i - 1].slot : last))
             {
-                if (!weighted(j) && !weighted(k))
-                {
-                    continue;
-                }
-                const label first = slot + stride.y()*j + stride.z()*k;
+                target.template fetch<N>(around, below);
+            }
+        }
 
-                if (runs[first] >= N)
+        for (label i = 0, end; i < count; i = end)
+        {
+            // those between the same cells
+            const label slot = some[i].slot;
+            for (end = i + 1; end < count && some[end].slot == slot; ++end)
+            {}
+            const bool opened = slot == last;
+            last = slot;
+
+            for (int k = 0; k < N; ++k)
+            {
+                double a[most][3*N], b[most][3*N];
+                for (label n = i; n < end; ++n)
                 {
-                    combine<3*N, true>
-                    (
-                        own[slots[first]].v_, w[1][j], a, s[1][j], b
-                    );
-                    continue;
+                    const beadRows<N>& bead = some[n];
+                    const double v = bead.w[1][k], d = bead.s[1][k];
+                    inRow<3*N>(v, bead.p, d, bead.r).store(a[n]);
+                    inRow<3*N>(v, bead.q, 0, bead.q).store(b[n]);
                 }
-                for (int m = 0; m < N; ++m)
+
+                for (int j = 0; j < N; ++j)
                 {
-                    const label value = slots[first + m];
-                    vector& cell =
-                        value < nCells ? own[value] : neighbours[value - nCells];
-                    for (int c = 0; c < 3; ++c)
+                    if (!inner(j) && !inner(k))
                     {
-                        cell[c] += w[1][j]*a[3*m + c] + s[1][j]*b[3*m + c];
+                        continue;
+                    }
+                    const auto ofBead = [&](const label n)
+                    {
+                        return inRow<3*N>
+                        (
+                            some[n].w[0][j], a[n], some[n].s[0][j], b[n]
+                        );
+                    };
+                    inRow<3*N> sum(ofBead(i));
+                    for (label n = i + 1; n < end; ++n)
+                    {
+                        sum += ofBead(n);
+                    }
+
+                    const label first = slot + stride.y()*j + stride.z()*k;
+                    if (runs[first] >= N)
+                    {
+                        if (!opened)
+                        {
+                            filled.open(slots[first], N, own);
+                        }
+                        sum.addTo(own[slots[first]].v_);
+                        continue;
+                    }
+                    double row[3*N];
+                    sum.store(row);
+                    for (int m = 0; m < N; ++m)
+                    {
+                        const label value = slots[first + m];
+                        if (value < nCells)
+                        {
+                            filled.open(value, 1, own);
+                        }
+                        vector& cell =
+                            value < nCells
+                          ? own[value] : neighbours[value - nCells];
+                        cell += vector(row[3*m], row[3*m + 1], row[3*m + 2]);
                     }
                 }
             }
@@ -244,16 +350,19 @@ VECTORISED                                                                     \
 void spreadWith                                                                \
 (                                                                              \
     const interpolation& interpolant, const lattice& cells,                    \
-    const beadExchange& beads, const scalar* loads, vector* own,               \
-    vector* neighbours, const label nCells                                     \
+    const beadExchange& beads, const scalar* loads, vectorField& own,          \
+    filledParts& filled, vector* neighbours                                    \
 )                                                                              \
 {                                                                              \
-    spreadAll(interpolant, cells, beads, loads, own, neighbours, nCells);      \
+    spreadAll(interpolant, cells, beads, loads, own, filled, neighbours);      \
 }
 
 SPREAD_WITH(trilinear)
 SPREAD_WITH(cubic)
 SPREAD_WITH(quintic)
+
+#undef SPREAD_WITH
+#undef AT
 
 }
 
@@ -263,20 +372,22 @@ void Foam::latticeSampler<Interpolant>::spread
 (
     const UList<scalar>& loads,
     const beadExchange& beads,
-    vectorField& cells
+    vectorField& cells,
+    filledParts& filled
 ) const
 {
     static const Interpolant interpolant = Interpolant();
 
     cells.setSize(lattice_.nCells());
-    cells = Zero;
+    filled.begin(cells.size());
     List<vector> neighbours(lattice_.nNeighbours(), Zero);
     spreadWith
     (
-        interpolant, lattice_, beads, loads.cdata(), cells.begin(),
-        neighbours.begin(), cells.size()
+        interpolant, lattice_, beads, loads.cdata(), cells, filled,
+        neighbours.begin()
     );
-    lattice_.addBack(neighbours, cells);
+    lattice_.addBack(neighbours, cells, filled);
+    filled.end(cells);
 }
 
 

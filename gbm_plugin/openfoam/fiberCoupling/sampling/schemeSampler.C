@@ -72,7 +72,8 @@ void Foam::schemeSampler::spread
 (
     const UList<scalar>&,
     const beadExchange&,
-    vectorField&
+    vectorField&,
+    filledParts&
 ) const
 {
     FatalErrorInFunction
