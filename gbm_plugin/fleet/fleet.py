@@ -217,7 +217,13 @@ class Fleet(Group):
             try:
                 part = slice(family.first - offset, end - offset)
                 stepper.restore(merged_states(own, part))
-                if disturbance := self._own.get(family.name):
+                disturbance = self._own.get(family.name)
+                if disturbance and not any(OWN in o for o in own):
+                    log.info(
+                        "family %s: its own disturbance begins here, where feedback or its removal does",
+                        family.name,
+                    )
+                elif disturbance:
                     disturbance.restore(
                         np.concatenate([o[OWN] for o in own])[part].reshape(-1, *own[0][OWN].shape[2:])
                     )
@@ -245,7 +251,7 @@ class Fleet(Group):
             try:
                 own = _of_family(state, family.name)
                 check_state(own, part.stop - part.start, family.beads)
-                if family.name in self._own:
+                if OWN in own and family.name in self._own:
                     form = ("f", (part.stop - part.start, family.beads, range(SHELLS, SHELLS + 4), 6))
                     check_arrays(own, {OWN: form})
             except ValueError as error:

@@ -259,6 +259,7 @@ class OwnDisturbance:
         if time_step != self._step:
             self._tabulate(time_step)
         self._loads = np.concatenate([np.concatenate([force, torque], axis=1)[None], self._loads[:2]])
+        self._motion = np.empty_like(self._motion)  # the one before may still be looked at
         own = (self._fades, self._half, self._drag, time_step, self._weight, only_read(self._loads))
         in_shares(_advance, COST * len(self._parts), *own, self._parts, self._motion)
 
@@ -275,6 +276,7 @@ class OwnDisturbance:
             )
         self._parts = np.ascontiguousarray(state[:, :SHELLS], float)
         self._loads = np.ascontiguousarray(state[:, SHELLS:].swapaxes(0, 1), float)
+        self._motion = np.empty_like(self._motion)
         in_shares(_sum, COST * beads, self._weight, self._parts, self._motion)
 
 

@@ -20,22 +20,32 @@ def read_dat(folder: Path | str, name: str) -> dict[str, NDArray[np.float64]]:
 
     folder: for example ``postProcessing/linearForcing``. Returns the columns by the names of the header line
     (``# Time a b``): (S,) for numbers, (S, n) for entries in parentheses; "Time" is the first. An unfinished
-    last line is left out. Raises FileNotFoundError if there is no such file, ValueError for a file without
-    a header, a line that does not fit it, or parts with different columns.
+    last line is left out. A part without some columns of the others, of a run whose feedback was switched on or off
+    at a restart, has NaN there. Raises FileNotFoundError if there is no such file, ValueError for a file without
+    a header, a line that does not fit it, or two parts with columns that the other has not.
     """
     files = files_by_start(folder, name)
     if not files:
         raise FileNotFoundError(f"no {name} in {folder}/<start time>/")
     tables = [_read_one(file) for file in files]
+    fullest = max(tables, key=len)
     for file, table in zip(files, tables, strict=True):
-        if list(table) != list(tables[0]):
-            raise ValueError(f"{file} has columns {', '.join(table)}; {files[0]} has {', '.join(tables[0])}")
+        if not table.keys() <= fullest.keys():
+            raise ValueError(f"{file} has columns {', '.join(table)}; another part has {', '.join(fullest)}")
     tables = [table for table in tables if len(table["Time"])] or tables[-1:]
     counts = kept([table["Time"] for table in tables])
+    parts = list(zip(tables, counts, strict=True))
     return {
-        column: np.concatenate([table[column][:count] for table, count in zip(tables, counts, strict=True)])
-        for column in tables[0]
+        column: np.concatenate([_column(table, column, values)[:count] for table, count in parts])
+        for column, values in fullest.items()
     }
+
+
+def _column(table: dict[str, NDArray], name: str, like: NDArray) -> NDArray:
+    """A column of a table, NaN where it has none."""
+    if name in table:
+        return table[name]
+    return np.full((len(table["Time"]), *like.shape[1:]), np.nan)
 
 
 def read_forcing(case: Path | str) -> dict[str, NDArray[np.float64]]:

@@ -24,10 +24,8 @@ CALLS = {
     "lattice/periodicBox.C": (3, "made for each mesh; lists by patch hold those that all ranks have"),
     "lattice/uniformBox.C": (3, "made for each mesh, with the answer of periodicBox, which is one for all"),
     "lattice/latticeNeighbours.C": (8, "lattice is made for each mesh, where uniformBox has no problem"),
-    "lattice/lattice.H": (
-        2,
-        "gather by correction and look, addBack by spread: of every rank, with cells and beads or without",
-    ),
+    "lattice/lattice.C": (1, "addBack by spread, of every rank, with cells and beads or without"),
+    "lattice/lattice.H": (1, "gather by correction and look, of every rank, with cells and beads or without"),
     "lattice/cellSearch.C": (
         6,
         "candidates: every rank looks at the points of all; owners are one list for all",

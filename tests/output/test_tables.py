@@ -62,6 +62,10 @@ def test_missing_and_different(tmp_path):
     put(tmp_path, "1", "# Time e\n1 2\n")
     with pytest.raises(ValueError, match="has columns Time, e;"):
         read_dat(tmp_path, "some.dat")
+    (tmp_path / "1/some.dat").write_text("# Time e k\n2 2 3\n")  # as with feedback switched on at a restart
+    table = read_dat(tmp_path, "some.dat")
+    np.testing.assert_array_equal(table["k"], [2, 3])
+    np.testing.assert_array_equal(table["e"], [np.nan, 2])
 
 
 def test_the_table_of_a_forcing_is_found_by_its_columns(tmp_path):

@@ -440,7 +440,8 @@ void Foam::functionObjects::fiberCoupling::conclude
     const times& t
 )
 {
-    if (stop)
+    // once: asked again, at the step with which it ends, the run would go on
+    if (stop && time_.stopAt() != Time::stopAtControls::saWriteNow)
     {
         Info<< type() << ": a daemon was asked to end the run:"
             << " writing and stopping after the next step" << endl;
