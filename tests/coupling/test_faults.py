@@ -604,8 +604,9 @@ def _continues(case, from_at_least: int) -> None:
 @pytest.mark.parametrize("victim", ["daemon", "solver"])
 @pytest.mark.parametrize("harm", [signal.SIGKILL, signal.SIGSTOP], ids=["killed", "stopped"])
 def test_of_a_run(victim, harm, long_case, silence):
-    if harm is signal.SIGSTOP:
-        set_coupling(long_case, "socket", silence)
+    """Two of four with forces between sample and positions."""
+    feedback = (victim == "daemon") == (harm is signal.SIGKILL)
+    set_coupling(long_case, "socket", silence if harm is signal.SIGSTOP else PATIENT, feedback)
     run = Run(long_case)
     both = run.at_step(12)
     os.kill(both[victim], harm)
@@ -647,6 +648,7 @@ def test_run_that_hangs_before_its_first_step(long_case, silence):
 )
 def test_run_stopped_on_request(number, long_case):
     """Flow and fibers are written at the step under way, though no write was due."""
+    set_coupling(long_case, "socket", PATIENT, feedback=number == signal.SIGTERM)
     set_entry(long_case / "system/controlDict", "writeInterval", "100000")
     run = Run(long_case)
     run.at_step(7)
@@ -713,6 +715,7 @@ def test_disk_full_while_recording(long_case, small_disk):
 
 
 def test_disk_full_while_the_state_of_the_fibers_is_written(long_case, small_disk):
+    set_coupling(long_case, "socket", PATIENT, feedback=True)
     small_disk(long_case / "0.08/uniform", "8k")
     with FakeSolver(long_case) as solver:
         solver.connect()
@@ -732,6 +735,7 @@ def test_disk_full_while_openfoam_writes(prepared, small_disk, tmp_path):
     small_disk(disk, "3m")
     case = disk / "case"
     shutil.copytree(prepared, case, ignore=shutil.ignore_patterns("log.*", "postProcessing", "gbm.*"))
+    set_coupling(case, "socket", PATIENT, feedback=True)
     set_entry(case / "system/controlDict", "endTime", "1000")
     set_entry(case / "system/controlDict", "writeInterval", "5")
     line = Run(case).line()

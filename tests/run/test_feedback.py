@@ -90,6 +90,19 @@ def test_without_the_word_nothing_is_added(tmp_path):
     assert "exchange" not in flow and "friction" not in fibers
 
 
+def test_it_may_be_switched_on_at_a_restart(tmp_path):
+    """Beads have no disturbance of their own in a flow that they have not acted on."""
+    path = make_case(tmp_path / "case", prepared=False, families=FAMILIES, steps=3, write_every=3)
+    run_case(path, "--flow", "spectral")
+    feedback(path)
+    set_entry(path / "system/controlDict", "endTime", "0.12")
+    done = run_case(path, "--flow", "spectral")
+    assert "family stiff: its own disturbance begins here" in done.stdout + done.stderr
+    flow, fibers = tables(path)
+    assert np.isnan(fibers["own"][:3]).all() and fibers["own"][3] == 0 and (fibers["own"][4:] != 0).all()
+    assert np.isnan(flow["exchange"][:3]).all() and (flow["exchange"][3:] != 0).all()
+
+
 def test_stored_fields_cannot_be_changed(tmp_path):
     path = coupled(tmp_path / "case")
     done = gbm("run", path, "--flow", "stored")
