@@ -4,7 +4,8 @@ On its way between modes and points a field is `mixed` (n, 5, 2K+1, blocks, 2, l
 that columns along x and y lie in lanes, a block of kz, its real and its imaginary parts. A plane of it then becomes
 `lines` (5, groups, kz, 2, lanes): points in y, a group of which lies in lanes, so that columns along z do. There two
 groups of real fields a, b are one complex field, a + i b, whose modes are A(k) + i B(k), and those of -k
-conj A(k) + i conj B(k). Every transform is of one block of columns, in the first-level cache.
+conj A(k) + i conj B(k). Every transform is of one block of columns, in the first-level cache. Arrays of modes are
+C-contiguous, and ordered as `Modes` says.
 """
 
 from functools import partial
@@ -33,7 +34,6 @@ from .transform import Plan, get, plan, put, transform
 # sums may be reordered and fused; infinities and NaN keep their meaning
 jit = partial(kernel, _nrt=False, fastmath={"contract", "reassoc", "nsz"})
 
-
 FIELDS = 5  # that are transformed at once
 
 
@@ -46,7 +46,7 @@ class Work(NamedTuple):
     zero: NDArray  # (1, 2, lanes)
     x: NDArray  # (blocks, >= n, 2, lanes), columns that are transformed; what is beyond n is zero
     y: NDArray  # (5, blocks, >= n, 2, lanes), and what they are transformed to
-    lines: NDArray
+    lines: NDArray  # (5, groups, kz, 2, lanes), a plane
     kz: NDArray  # (blocks, lanes)
     speed: NDArray  # (1, lanes), the largest |u| + |v| + |w| of each lane
 
@@ -76,6 +76,23 @@ def _place(mixed, x, c, j, block):
     return ((x * mixed.shape[1] + c) * mixed.shape[2] + j) * mixed.shape[3] + block
 
 
+# what the next transform but one needs comes from memory while the next one computes
+
+
+@bare
+def _will_read(mixed, place):
+    """Have a point of a block of columns brought near."""
+    prefetch(mixed, 2 * place)
+    prefetch(mixed, 2 * place + 1)
+
+
+@bare
+def _will_write(mixed, place):
+    """Have the room for a point of a block of columns brought near."""
+    prefetch_to_write(mixed, 2 * place)
+    prefetch_to_write(mixed, 2 * place + 1)
+
+
 @bare
 def _clear(x, first, last, work):
     """Set points of a block of columns to zero."""
@@ -97,9 +114,7 @@ def to_mixed(u, mixed, work, start, stop):
                     put(x[block], rows[i], load_complex(u, first + kz, min(lanes, half - kz)))
             for block in range(x.shape[0]):
                 for i in range(n):
-                    at = 2 * _place(mixed, i, c, j, block)
-                    prefetch_to_write(mixed, at)
-                    prefetch_to_write(mixed, at + 1)
+                    _will_write(mixed, _place(mixed, i, c, j, block))
                 _clear(x[block], half, n - half + 1, work)
                 transform(x[block], y[block], work.inverse)
             for i in range(n):
@@ -111,16 +126,14 @@ def to_mixed(u, mixed, work, start, stop):
 def _from_mixed(mixed, c, j, work):
     """work.y[c] = modes in x, all n of them, of field c in a row of ky."""
     x, y = work.x, work.y[c]
-    next_c, next_j = (c + 1, j) if c < 4 else (0, j + 1)
+    next_c, next_j = (c + 1, j) if c < FIELDS - 1 else (0, j + 1)
     for i in range(mixed.shape[0]):
         for block in range(x.shape[0]):
             put(x[block], i, get(mixed, _place(mixed, i, c, j, block)))
     for block in range(x.shape[0]):
         if next_j < mixed.shape[2]:
             for i in range(mixed.shape[0]):
-                at = 2 * _place(mixed, i, next_c, next_j, block)
-                prefetch(mixed, at)
-                prefetch(mixed, at + 1)
+                _will_read(mixed, _place(mixed, i, next_c, next_j, block))
         transform(x[block], y[block], work.forward)
 
 
@@ -208,9 +221,7 @@ def _to_lines(mixed, plane, fields, work):
             next_block, next_c = (block + 1, c) if block + 1 < mixed.shape[3] else (0, c + 1)
             if next_c < fields:
                 for j in range(rows.size):
-                    at = 2 * _place(mixed, plane, next_c, j, next_block)
-                    prefetch(mixed, at)
-                    prefetch(mixed, at + 1)
+                    _will_read(mixed, _place(mixed, plane, next_c, j, next_block))
             transform(x, y, work.inverse)
             for group in range(target.shape[0]):
                 into = 2 * (group * target.shape[1] + block * lanes)
@@ -230,9 +241,7 @@ def _from_lines(mixed, plane, fields, work):
                 transpose(source, first, 2, x, 2 * group * lanes, 2)
                 transpose(source, first + 1, 2, x, 2 * group * lanes + 1, 2)
             for j in range(rows.size):
-                at = 2 * _place(mixed, plane, c, j, block)
-                prefetch_to_write(mixed, at)
-                prefetch_to_write(mixed, at + 1)
+                _will_write(mixed, _place(mixed, plane, c, j, block))
             transform(x, y, work.forward)
             for j in range(rows.size):
                 put(mixed, _place(mixed, plane, c, j, block), get(y, rows[j]))

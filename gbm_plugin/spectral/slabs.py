@@ -44,7 +44,7 @@ class Slabs(Arrays):
         self.max_speed = max(float(w.speed.max()) for w in self._works) if want_speed else None
 
     def to_physical(self, modes, out=None):
-        n = self.modes.cells
+        n, modes = self.modes.cells, np.ascontiguousarray(modes, self.complex)
         if out is None:  # in the order of flow.grid.for_sampling
             out = np.moveaxis(np.empty((n, n, n, len(modes)), self.real), -1, 0)
         for first in range(0, len(modes), FIELDS):
