@@ -30,7 +30,7 @@ STEP = 0.4e-3
 BOX_FOAM = 3.0e-9  # times log2(cells)
 OUTER, PRESSURE = 1.6e-6, 0.25e-6  # pimpleFoam, pisoFoam: an outer corrector, a pressure equation in it
 # of the spectral solver, times log2(nodes): a step; one of the fields at the nodes that are sampled
-MODES, FIELD = 2.4e-9, 0.5e-9
+MODES, FIELD = 1.5e-9, 0.35e-9
 RUNGE_KUTTA = 6  # right-hand sides more, in the first steps of the spectral solver
 
 # velocity and rotation at a bead [s], by the interpolation
