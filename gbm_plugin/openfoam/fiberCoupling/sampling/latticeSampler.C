@@ -105,119 +105,66 @@ void sampleWith
 typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
-#define AT(type, numbers) (*reinterpret_cast<type*>(numbers))
 
-
-//- M numbers in a row, in registers
-template<int M>
-struct inRow
+//- target (+)= f a + g b
+template<int M, bool add>
+INLINE void combine
+(
+    double* target,
+    const double f,
+    const double* a,
+    const double g,
+    const double* b
+)
 {
+    #define COMBINE(type, i)                                                   \
+    {                                                                          \
+        type& t = reinterpret_cast<type&>(target[i]);                          \
+        const type sum =                                                       \
+            f*reinterpret_cast<const type&>(a[i])                              \
+          + g*reinterpret_cast<const type&>(b[i]);                             \
+        t = add ? t + sum : sum;                                               \
+    }
     static_assert(M % 2 == 0, "pairs");
-
-    four most[M/4];
-    pair rest;
-
-    //- f a + g b
-    INLINE inRow(const double f, const double* a, const double g, const double* b)
-    :
-        rest{0, 0}
-    {
-        for (int i = 0; i < M/4; ++i)
-        {
-            most[i] = f*AT(const four, a + 4*i) + g*AT(const four, b + 4*i);
-        }
-        if (M % 4)
-        {
-            rest = f*AT(const pair, a + M - 2) + g*AT(const pair, b + M - 2);
-        }
-    }
-
-    INLINE void operator+=(const inRow& other)
-    {
-        for (int i = 0; i < M/4; ++i)
-        {
-            most[i] += other.most[i];
-        }
-        rest += other.rest;
-    }
-
-    INLINE void store(double* row) const
-    {
-        for (int i = 0; i < M/4; ++i)
-        {
-            AT(four, row + 4*i) = most[i];
-        }
-        if (M % 4)
-        {
-            AT(pair, row + M - 2) = rest;
-        }
-    }
-
-    INLINE void addTo(double* row) const
-    {
-        for (int i = 0; i < M/4; ++i)
-        {
-            AT(four, row + 4*i) += most[i];
-        }
-        if (M % 4)
-        {
-            AT(pair, row + M - 2) += rest;
-        }
-    }
-};
+    for (int i = 0; i + 4 <= M; i += 4) COMBINE(four, i)
+    if (M % 4) COMBINE(pair, M - 2)
+    #undef COMBINE
+}
 
 
-//- What the loads of a bead are to the cells around it: a row of cells along x
-//  gets w_y (w_z p + s_z r) + s_y w_z q
+//- The N^3 cells from a slot on, as far as they are local, will be added to
 template<int N>
-struct beadRows
+__attribute__((noinline)) void open
+(
+    const lattice& cells,
+    const label slot,
+    vectorField& own,
+    filledParts& filled
+)
 {
-    //- Slot of the lowest cell
-    label slot;
+    const Vector<label> stride(cells.strides());
+    const label* slots = cells.slots().cdata();
+    const unsigned char* runs = cells.runs().cdata();
 
-    //- Weights of value and slope in y and z
-    double w[2][N], s[2][N];
-
-    //- Along x: the force with the couple x slope there, and what the slopes
-    //  in y and z multiply, couple x e_y and couple x e_z
-    double p[3*N], q[3*N], r[3*N];
-
-    template<class Interpolant>
-    INLINE void set
-    (
-        const Interpolant& interpolant,
-        const vector& x,
-        const vector& perCell,
-        const double* load
-    )
+    for (int k = 0; k < N; ++k)
+    for (int j = 0; j < N; ++j)
     {
-        double along[N], slope[N];
-        interpolant.weights(x.x(), along, slope);
-        for (direction d = 0; d < 2; ++d)
+        const label first = slot + stride.y()*j + stride.z()*k;
+        if (runs[first] >= N)
         {
-            interpolant.weights(x[d + 1], w[d], s[d]);
-            for (int m = 0; m < N; ++m)
-            {
-                s[d][m] *= perCell[d + 1];
-            }
+            filled.open(slots[first], N, own);
+            continue;
         }
-
-        const vector couple(0.5*load[3], 0.5*load[4], 0.5*load[5]);
         for (int m = 0; m < N; ++m)
         {
-            const double v = along[m], d = slope[m]*perCell.x();
-            p[3*m] = v*load[0];
-            p[3*m + 1] = v*load[1] + d*couple.z();
-            p[3*m + 2] = v*load[2] - d*couple.y();
-            q[3*m] = -v*couple.z();
-            q[3*m + 1] = 0;
-            q[3*m + 2] = v*couple.x();
-            r[3*m] = v*couple.y();
-            r[3*m + 1] = -v*couple.x();
-            r[3*m + 2] = 0;
+            const label celli = slots[first + m];
+            if (celli >= 0 && celli < own.size())
+            {
+                filled.open(celli, 1, own);
+            }
         }
     }
-};
+}
 
 
 //- What 'spread' of sampler gives, in the order of the points
@@ -228,116 +175,107 @@ INLINE void spreadAll
     const lattice& cells,
     const beadExchange& beads,
     const scalar* loads,
-    vectorField& own,
+    vectorField& field,
     filledParts& filled,
     vector* neighbours
 )
 {
+    vector* own = field.begin();
+    const label nCells = field.size();
     constexpr int N = Interpolant::reach;
     constexpr int below = Interpolant::below;
     constexpr int outer = Interpolant::outer;
-    const auto inner = [](const int m)
+    const auto weighted = [](const int m)
     {
         return outer <= m && m < N - outer;
     };
     const vector perCell(cells.box().perCell());
     const Vector<label> stride(cells.strides());
-    const label lowest = below*(stride.x() + stride.y() + stride.z());
     const label* slots = cells.slots().cdata();
     const unsigned char* runs = cells.runs().cdata();
-    const label nCells = own.size();
-    const stencil target
-    {
-        slots, runs, 0, stride, own.cdata(), neighbours, nCells
-    };
+    const stencil target{slots, runs, 0, stride, own, neighbours, nCells};
+
     const UList<point>& points = beads.points();
+    vector next;
+    label nextSlot = points.size() ? cells.around(points[0], next) : 0;
+    label opened = -1;
 
-    // some beads at a time: their rows are in memory, and their cells have
-    // come from there, when they are added
-    constexpr label most = 8;
-    beadRows<N> some[most];
-    label last = -1;
-
-    for (label start = 0; start < points.size(); start += most)
+    forAll(points, bead)
     {
-        const label count = min(most, points.size() - start);
-        for (label i = 0; i < count; ++i)
+        const vector x(next);
+        const label slot =
+            nextSlot - below*(stride.x() + stride.y() + stride.z());
+        if (bead + 1 < points.size())
         {
-            vector x;
-            const label around = cells.around(points[start + i], x);
-            some[i].slot = around - lowest;
-            some[i].set
-            (
-                interpolant, x, perCell, loads + 6*beads.placeOf(start + i)
-            );
-            if (some[i].slot != (i ? some[i - 1].slot : last))
-            {
-                target.template fetch<N>(around, below);
-            }
+            nextSlot = cells.around(points[bead + 1], next);
+            target.template fetch<N>(nextSlot, below);
         }
 
-        for (label i = 0, end; i < count; i = end)
+        if (slot != opened)
         {
-            // those between the same cells
-            const label slot = some[i].slot;
-            for (end = i + 1; end < count && some[end].slot == slot; ++end)
-            {}
-            const bool opened = slot == last;
-            last = slot;
+            open<N>(cells, slot, field, filled);
+            opened = slot;
+        }
 
-            for (int k = 0; k < N; ++k)
+        double w[3][N], s[3][N];
+        for (direction d = 0; d < 3; ++d)
+        {
+            interpolant.weights(x[d], w[d], s[d]);
+            for (int m = 0; m < N; ++m)
             {
-                double a[most][3*N], b[most][3*N];
-                for (label n = i; n < end; ++n)
+                s[d][m] *= perCell[d];
+            }
+        }
+        const scalar* load = loads + 6*beads.placeOf(bead);
+        const vector couple(0.5*load[3], 0.5*load[4], 0.5*load[5]);
+
+        // along x: the force with the couple x slope there, and what the
+        // slopes in y and z multiply, couple x e_y and couple x e_z
+        double p[3*N], q[3*N], r[3*N];
+        for (int m = 0; m < N; ++m)
+        {
+            const double v = w[0][m], d = s[0][m];
+            p[3*m] = v*load[0];
+            p[3*m + 1] = v*load[1] + d*couple.z();
+            p[3*m + 2] = v*load[2] - d*couple.y();
+            q[3*m] = -v*couple.z();
+            q[3*m + 1] = 0;
+            q[3*m + 2] = v*couple.x();
+            r[3*m] = v*couple.y();
+            r[3*m + 1] = -v*couple.x();
+            r[3*m + 2] = 0;
+        }
+
+        for (int k = 0; k < N; ++k)
+        {
+            double a[3*N], b[3*N];
+            combine<3*N, false>(a, w[2][k], p, s[2][k], r);
+            combine<3*N, false>(b, w[2][k], q, 0, q);
+
+            for (int j = 0; j < N; ++j)
+            {
+                if (!weighted(j) && !weighted(k))
                 {
-                    const beadRows<N>& bead = some[n];
-                    const double v = bead.w[1][k], d = bead.s[1][k];
-                    inRow<3*N>(v, bead.p, d, bead.r).store(a[n]);
-                    inRow<3*N>(v, bead.q, 0, bead.q).store(b[n]);
+                    continue;
                 }
+                const label first = slot + stride.y()*j + stride.z()*k;
 
-                for (int j = 0; j < N; ++j)
+                if (runs[first] >= N)
                 {
-                    if (!inner(j) && !inner(k))
+                    combine<3*N, true>
+                    (
+                        own[slots[first]].v_, w[1][j], a, s[1][j], b
+                    );
+                    continue;
+                }
+                for (int m = 0; m < N; ++m)
+                {
+                    const label value = slots[first + m];
+                    vector& cell =
+                        value < nCells ? own[value] : neighbours[value - nCells];
+                    for (int c = 0; c < 3; ++c)
                     {
-                        continue;
-                    }
-                    const auto ofBead = [&](const label n)
-                    {
-                        return inRow<3*N>
-                        (
-                            some[n].w[0][j], a[n], some[n].s[0][j], b[n]
-                        );
-                    };
-                    inRow<3*N> sum(ofBead(i));
-                    for (label n = i + 1; n < end; ++n)
-                    {
-                        sum += ofBead(n);
-                    }
-
-                    const label first = slot + stride.y()*j + stride.z()*k;
-                    if (runs[first] >= N)
-                    {
-                        if (!opened)
-                        {
-                            filled.open(slots[first], N, own);
-                        }
-                        sum.addTo(own[slots[first]].v_);
-                        continue;
-                    }
-                    double row[3*N];
-                    sum.store(row);
-                    for (int m = 0; m < N; ++m)
-                    {
-                        const label value = slots[first + m];
-                        if (value < nCells)
-                        {
-                            filled.open(value, 1, own);
-                        }
-                        vector& cell =
-                            value < nCells
-                          ? own[value] : neighbours[value - nCells];
-                        cell += vector(row[3*m], row[3*m + 1], row[3*m + 2]);
+                        cell[c] += w[1][j]*a[3*m + c] + s[1][j]*b[3*m + c];
                     }
                 }
             }
@@ -360,9 +298,6 @@ void spreadWith                                                                \
 SPREAD_WITH(trilinear)
 SPREAD_WITH(cubic)
 SPREAD_WITH(quintic)
-
-#undef SPREAD_WITH
-#undef AT
 
 }
 
