@@ -34,7 +34,7 @@ FAMILIES = """
 
 
 def make(path: Path, daemons: int, ranks: int = 1, **options) -> Path:
-    make_case(path, steps=STEPS, families=FAMILIES, prepared=False, **{"write_every": 10, **options})
+    make_case(path, steps=STEPS, families=FAMILIES, **{"write_every": 10, **options})
     use_daemons(path, daemons)
     if ranks > 1:
         divide(path, ranks, (1, 1, ranks))

@@ -14,9 +14,9 @@ from targets import TARGETS
 
 
 def test_altered_files_end_in_a_line():
-    found = fuzz(40, seed=7)
+    found = fuzz(30, seed=7)
     assert all(line["outcome"] in FINE for line in found), "\n".join(map(str, found))
-    assert sum(line["outcome"] == REFUSED for line in found) > 20, table(found)  # the alterations are some
+    assert sum(line["outcome"] == REFUSED for line in found) > 15, table(found)  # the alterations are some
 
 
 @pytest.fixture(scope="module")

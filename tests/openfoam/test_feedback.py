@@ -21,12 +21,13 @@ FAMILIES = """
 """
 VOLUME = (2 * np.pi) ** 3
 SOLVERS = ("boxFoam", "pimpleFoam")
+FURTHER = [("boxFoam", 2, 1), ("pimpleFoam", 2, 1), ("pimpleFoam", 2, 2)]  # with daemons and ranks
 
 
 def coupled(path, application="boxFoam", *, ranks=1, daemons=1, words="", **options):
     """A case with enough of fibers to change the flow by a tenth."""
     options = {"steps": 20, "write_every": 10, "families": FAMILIES} | options
-    make_case(path, application=application, prepared=False, **options)
+    make_case(path, application=application, **options)
     properties = path / "constant/fiberProperties"
     words = f"coupling {{ feedback yes; daemons {daemons}; {words}"
     properties.write_text(properties.read_text().replace("coupling {", words))
@@ -95,7 +96,11 @@ def test_the_budget_closes_with_the_exchange(whole):
         assert np.abs(flow[f"meanU{c}"]).max() < 1e-13
 
 
-@pytest.mark.parametrize("daemons, ranks", [pytest.param(2, 1, marks=pytest.mark.exhaustive), (2, 2)])
+@pytest.mark.parametrize(
+    "whole, daemons, ranks",
+    [("boxFoam", 2, 2), *(pytest.param(*case, marks=pytest.mark.exhaustive) for case in FURTHER)],
+    indirect=["whole"],
+)
 def test_on_ranks_and_daemons_it_is_the_same_run(whole, tmp_path, daemons, ranks):
     solver, path = whole
     steps = 20 if solver == "boxFoam" else 3  # tight linear solvers on ranks take their time
@@ -109,6 +114,9 @@ def test_on_ranks_and_daemons_it_is_the_same_run(whole, tmp_path, daemons, ranks
     np.testing.assert_allclose(flow["exchange"] * VOLUME, total, rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "whole", ["boxFoam", pytest.param("pimpleFoam", marks=pytest.mark.exhaustive)], indirect=True
+)
 def test_a_stopped_run_continues_to_the_same_bits(whole, tmp_path):
     solver, path = whole
     other = coupled(tmp_path / "case", solver)

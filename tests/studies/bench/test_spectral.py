@@ -5,6 +5,7 @@ import pytest
 from gbm_plugin.studies.bench import spectral
 
 
+@pytest.mark.exhaustive  # it compiles transforms by themselves
 def test_benchmark_at_a_small_size():
     result = spectral.run(cells=16, repeats=2)
     for precision in ("double", "single"):

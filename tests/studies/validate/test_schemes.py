@@ -11,6 +11,7 @@ from conftest import DEFAULT_CASE
 pytestmark = pytest.mark.openfoam
 
 
+@pytest.mark.exhaustive
 def test_what_is_known_of_schemes():
     """Implicit Euler is of first order and two outer correctors do not cure it; values averaged to
     the points of the mesh first carry beads worse than those of the cells, and leave the flow as it is."""
