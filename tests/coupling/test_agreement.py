@@ -36,7 +36,7 @@ FAMILIES = """
 def run(path, ranks: int = 1, division=None, **options):
     """Positions (S, B, 3) of all beads at every step."""
     options = {"steps": STEPS} | options
-    make_case(path, families=FAMILIES, time_step=0.04, **options)
+    make_case(path, families=FAMILIES, prepared=False, time_step=0.04, **options)
     np.save(path / "constant/placed.npy", fibers_on_faces())
     if ranks > 1:
         divide(path, ranks, division)
@@ -86,7 +86,7 @@ def test_a_rank_without_beads(tmp_path):
     fiber[0, :, 0] += 0.2 * np.arange(4)
     results = []
     for name, ranks in (("serial", 1), ("parallel", 4)):
-        path = make_case(tmp_path / name, steps=5, families=family)
+        path = make_case(tmp_path / name, steps=5, families=family, prepared=False)
         np.save(path / "constant/one.npy", fiber)
         if ranks > 1:
             divide(path, ranks, (1, 1, 4))
