@@ -9,7 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-NEEDS = ("velocity", "rotation", "gradient")  # each costs more than the one before
+# of a sample: the velocity, and what is needed beside it
+NUMBERS = {"velocity": 3, "rotation": 6, "gradient": 12}
+NEEDS = tuple(NUMBERS)  # each costs more than the one before
 
 
 class FlowEnded(ValueError):

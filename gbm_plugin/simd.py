@@ -299,6 +299,24 @@ load, load3, load6, load9 = _load(1), _load(3), _load(6), _load(9)
 store, store3, store6, store9 = _store(1), _store(3), _store(6), _store(9)
 
 
+def _masked(builder, name, vector, result, place, mask, *before, after=()):
+    """A call of llvm.masked.<name> for the lanes of a mask, of numbers that need not lie in one line."""
+    bits = 64 if vector.element == ir.DoubleType() else 32
+    arguments = [*before, place, ir.Constant(ir.IntType(32), bits // 8), mask, *after]
+    form = ir.FunctionType(result, [argument.type for argument in arguments])
+    name = f"llvm.masked.{name}.v{vector.count}f{bits}.p0"
+    return builder.call(cgutils.get_or_insert_function(builder.module, form, name), arguments)
+
+
+def _masked_load(builder, vector, place, mask):
+    """0 in the other lanes, of whose places nothing is read."""
+    return _masked(builder, "load", vector, vector, place, mask, after=[ir.Constant(vector, None)])
+
+
+def _masked_store(builder, value, place, mask):
+    return _masked(builder, "store", value.type, ir.VoidType(), place, mask, value)
+
+
 @intrinsic
 def load_part(typingctx, array, at, first, last):
     """Lanes first to last − 1 from the places at + first, … of an array as it lies in memory, of either precision; 0
@@ -306,7 +324,6 @@ def load_part(typingctx, array, at, first, last):
 
     kind = ir.DoubleType() if array.dtype == types.float64 else ir.FloatType()
     numbers_type, vector = ir.VectorType(ir.IntType(64), LANES), ir.VectorType(kind, LANES)
-    name = f"llvm.masked.load.v{LANES}f{array.dtype.bitwidth}.p0"
 
     def codegen(context, builder, signature, args):
         array_, at, first, last = args
@@ -317,10 +334,7 @@ def load_part(typingctx, array, at, first, last):
             builder.icmp_signed(">=", numbers, _splat(builder, first, numbers_type)),
             builder.icmp_signed("<", numbers, _splat(builder, last, numbers_type)),
         )
-        align, none = ir.Constant(ir.IntType(32), array.dtype.bitwidth // 8), ir.Constant(vector, None)
-        function = ir.FunctionType(vector, [place.type, align.type, wanted.type, vector])
-        call = cgutils.get_or_insert_function(builder.module, function, name)
-        value = builder.call(call, [place, align, wanted, none])
+        value = _masked_load(builder, vector, place, wanted)
         return value if kind == ir.DoubleType() else builder.fpext(value, lanes.vector)
 
     return lanes(array, types.intp, types.intp, types.intp), codegen
@@ -396,21 +410,14 @@ def _some(context, builder, array_type, array, i, count):
         yield place, builder.icmp_signed("<", lanes_of_row, last)
 
 
-def _masked(builder, name, kind, result, *arguments):
-    form = ir.FunctionType(result, [argument.type for argument in arguments])
-    name = f"llvm.masked.{name}.v{kind.count}f{kind.real.bitwidth}.p0"
-    return builder.call(cgutils.get_or_insert_function(builder.module, form, name), arguments)
-
-
 @intrinsic
 def load_complex(typingctx, array, i, count):
     """Real and imaginary parts of `count` numbers, no more than there are lanes; 0 in the other lanes."""
     kind = _OF[array.dtype.underlying_float]
 
     def codegen(context, builder, signature, args):
-        align, none = ir.Constant(ir.IntType(32), kind.real.bitwidth // 8), ir.Constant(kind.vector, None)
         low, high = (
-            _masked(builder, "load", kind, kind.vector, place, align, mask, none)
+            _masked_load(builder, kind.vector, place, mask)
             for place, mask in _some(context, builder, signature.args[0], *args)
         )
         parts = [
@@ -427,13 +434,12 @@ def store_complex(typingctx, array, i, count, value):
     kind = _OF[array.dtype.underlying_float]
 
     def codegen(context, builder, signature, args):
-        align = ir.Constant(ir.IntType(32), kind.real.bitwidth // 8)
         re, im = cgutils.unpack_tuple(builder, args[3], 2)
         for row, (place, mask) in enumerate(_some(context, builder, signature.args[0], *args[:3])):
             lanes_of_row = range(row * kind.count // 2, (row + 1) * kind.count // 2)
             numbers = _places([kind.count * part + s for s in lanes_of_row for part in (0, 1)])
             values = builder.shuffle_vector(re, im, numbers)
-            _masked(builder, "store", kind, ir.VoidType(), values, place, align, mask)
+            _masked_store(builder, values, place, mask)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, types.intp, types.UniTuple(kind, 2)), codegen

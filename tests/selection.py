@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-LEFT_OUT = ("openfoam", "slow", "exhaustive")  # of a run that names nothing
+NOT_QUICK, FURTHER = ("openfoam", "slow"), ("exhaustive",)  # markers
 PROGRAMS = ["blockMesh", "boxFoam", "decomposePar", "foamToVTK", "icoFoam", "mpirun"]
 PROGRAMS += ["pimpleFoam", "pisoFoam", "postProcess", "reconstructPar", "renumberMesh"]
 REFUSAL = '#!/bin/sh\necho "this test runs ${0##*/} and is not marked openfoam" >&2\nexit 1\n'
@@ -39,7 +39,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if config.option.exhaustive:
         return
-    names = LEFT_OUT[-1:] if config.option.all else LEFT_OUT
+    names = FURTHER if config.option.all else NOT_QUICK + FURTHER
     left_out = [item for item in items if any(item.get_closest_marker(name) for name in names)]
     config.hook.pytest_deselected(items=left_out)
     items[:] = [item for item in items if item not in set(left_out)]

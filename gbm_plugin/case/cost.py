@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fiber.model import AFFORDABLE
+from ..sampling import NUMBERS
 from .dictionary import Dictionary
 from .disk import needed, writes
 from .layout import SPECTRAL
-from .plan import SAMPLE, need
+from .plan import need
 from .scene import Family, Scene
 from .solver import sub_cycles
 from .verdict import GOOD, Verdict, graded, sub_steps
@@ -89,7 +90,7 @@ class Cost:
 def cost(scene: Scene, slower: float | None = None) -> Cost:
     """The estimate. slower: than the machine of the costs; None: measured."""
     slower = machine() if slower is None else slower
-    steps = round(max(0.0, scene.end_time - scene.start_time) / scene.time_step)
+    steps = scene.steps
     cells, beads = math.prod(scene.cells or (0,)), sum(f.count * f.beads for f in scene.families)
     flow = _flow(scene, cells, steps)
     step = None if flow is None else flow / max(steps, 1)
@@ -121,7 +122,7 @@ def cost(scene: Scene, slower: float | None = None) -> Cost:
 
 def patience(scene: Scene, takes: Cost) -> list[Verdict]:
     """Of fibers so dear that the solver, which waits for them, may take the daemon for lost."""
-    steps = round(max(0.0, scene.end_time - scene.start_time) / scene.time_step)
+    steps = scene.steps
     if scene.application == SPECTRAL or not steps:
         return []
     longest, step = scene.coupling.timeout, takes.daemon / steps
@@ -167,8 +168,8 @@ def _sampled(scene: Scene, cells: int, beads: int) -> float:
     if scene.application != SPECTRAL:
         bead = AT_CELLS.get(word, AT_CELLS_OTHER) + (missed if 24 * cells > CACHE else 0.0)
         return EXCHANGE + beads * (BEAD + bead) + (0.0 if word in AT_CELLS else WHOLE * cells)
-    numbers = SAMPLE[need(scene)]
-    part = numbers / SAMPLE["rotation"]
+    numbers = NUMBERS[need(scene)]
+    part = numbers / NUMBERS["rotation"]
     if word == "exact":
         return part * beads * AT_NODES_EXACT * 4 / 27 * cells
     bead = AT_NODES.get(word, 0.0) + (missed if 8 * numbers * cells > CACHE else 0.0)

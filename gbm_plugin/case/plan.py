@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..fiber.model import AFFORDABLE
+from ..sampling import NUMBERS
 from .dictionary import Dictionary
 from .disk import readable, writes
 from .layout import SPECTRAL
@@ -15,7 +16,6 @@ from .verdict import sub_steps
 FIBERS = "constant/fiberProperties"
 WORDS = {"freeDrain": "free drain", "rpy": "RPY"}
 LAWS = ("bending_torque", "curvature_law")
-SAMPLE = {"rotation": 6, "gradient": 12}  # numbers of a bead
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def exchanged(scene: Scene) -> Item:
     if scene.application == SPECTRAL:
         return Item("exchanges", "nothing: flow and fibers are one process", asked_by(scene))
     beads = sum(f.count * f.beads for f in scene.families)
-    out, back = (72 if scene.coupling.feedback else 24) * beads, 8 * SAMPLE[need(scene)] * beads
+    out, back = (72 if scene.coupling.feedback else 24) * beads, 8 * NUMBERS[need(scene)] * beads
     daemons = f"{scene.coupling.daemons} daemons" if scene.coupling.daemons > 1 else "1 daemon"
     how = f"{readable(out)} out, {readable(back)} back a step, {daemons}"
     return Item("exchanges", how, f"{scene.coupling.transport}, {beads} beads")
@@ -89,16 +89,15 @@ def stored(scene: Scene) -> list[Item]:
     if scene.application == SPECTRAL:
         fields = f"{SPECTRAL}/<time>: U,"
     state = "flow and fibers" if scene.application in ("boxFoam", SPECTRAL) else "fibers"
-    steps = round((scene.end_time - scene.start_time) / scene.time_step)
     items = [Item("stores", f"{fields} states of {state} {writes(scene)} times", "writeInterval")]
     if scene.statistics:
         s = scene.statistics
         items.append(Item("", f"statistics.h5, every {s.interval} steps from t = {s.since:g}", "statistics"))
     beside = "positions" + "".join(f", {name}" for name in scene.record)
-    records = steps // scene.record_interval + 1
+    records = scene.steps // scene.record_interval + 1
     items.append(Item("", f"{beside} of all beads, {records} times", "recordInterval"))
     tables = "rows of flow and fibers" if scene.forcing and scene.forcing.table else "a row of the fibers"
-    items.append(Item("", f"{tables} in {steps} steps", "always"))
+    items.append(Item("", f"{tables} in {scene.steps} steps", "always"))
     return items
 
 

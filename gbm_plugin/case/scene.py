@@ -131,6 +131,11 @@ class Scene:
     texts: dict[str, str] = field(default_factory=dict, repr=False)
 
     @property
+    def steps(self) -> int:
+        """From startTime to endTime."""
+        return round(max(0.0, self.end_time - self.start_time) / self.time_step)
+
+    @property
     def dynamic_viscosity(self) -> float:
         """mu = rho nu [Pa s]."""
         return self.density * self.kinematic_viscosity

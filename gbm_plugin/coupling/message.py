@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.share import Share
-from ..sampling import NEEDS
+from ..sampling import NEEDS, NUMBERS
 
 MAGIC = b"GBMC"
 VERSION = 4
@@ -164,7 +164,7 @@ def encode_array(values: np.ndarray) -> memoryview:
 
 def sample_size(beads: int, need: str) -> int:
     """Bytes of a SAMPLE."""
-    return 8 * beads * {"velocity": 3, "rotation": 6, "gradient": 12}[need]
+    return 8 * beads * NUMBERS[need]
 
 
 def decode_sample(m: Message, beads: int, need: str) -> tuple[np.ndarray, np.ndarray | None]:

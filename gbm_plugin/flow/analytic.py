@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..compiled import kernel, only_read, part_of
-from ..sampling import NEEDS, one_of, rotation_of
+from ..sampling import NEEDS, NUMBERS, one_of, rotation_of
 from ..threads import in_shares
 from .trigonometry import sine_cosine
 
@@ -63,14 +63,11 @@ class TaylorGreen:
         shape = np.shape(positions)
         points = only_read(np.asarray(positions, dtype=float)).reshape(-1, 3)
         wavenumber = np.pi / self.width
-        extra = np.empty((len(points), _COLUMNS[one_of("need", need, NEEDS)]))
+        extra = np.empty((len(points), NUMBERS[one_of("need", need, NEEDS)] - 3))
         velocity = np.empty(points.shape)
         in_shares(_cellular, COST * len(points), points, wavenumber, self.velocity, velocity, extra)
         tail = (3, 3) if need == "gradient" else (3,)
         return velocity.reshape(shape), None if need == "velocity" else extra.reshape(*shape[:-1], *tail)
-
-
-_COLUMNS = {"velocity": 0, "rotation": 3, "gradient": 9}
 
 
 @kernel

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..sampling import NEEDS, FlowEnded, lagrange_weights, one_of
+from ..sampling import NEEDS, NUMBERS, FlowEnded, lagrange_weights, one_of
 from . import grid
 
 POINTS_IN_TIME = {"linear": 2, "cubic": 4}
@@ -15,7 +15,6 @@ LOCATIONS = {"nodes": 0.0, "centres": 0.5}  # where the values sit, in cells fro
 SAME_TIME = (
     1e-6  # times closer than this part of the interval between fields are one: names of folders are rounded
 )
-COLUMNS = {"velocity": 0, "rotation": 3, "gradient": 9}
 GAP = 1.5  # an interval so much longer than both beside it, and than the usual one, lacks a field
 
 
@@ -100,7 +99,7 @@ class StoredFlow:
         if self.inside is not None and not (within := self.inside(positions)).all():
             raise ValueError(f"the flow is not known at {positions[~within][0]}")
         points = positions.reshape(-1, 3)
-        velocity, extra = np.zeros(points.shape), np.zeros((len(points), COLUMNS[need]))
+        velocity, extra = np.zeros(points.shape), np.zeros((len(points), NUMBERS[need] - 3))
         for field, weight in zip(fields, weights, strict=True):
             grid.add_on_grid(self.interpolation, weight, field, points, self._lattice, velocity, extra)
         shape = positions.shape + (3,) * (need == "gradient")

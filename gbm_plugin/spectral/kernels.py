@@ -180,7 +180,7 @@ def slope(mixed, u, out, kx, ky, scale, linear, work, start, stop):
     stored, half = rows.size, u.shape[3]
     field = stored * stored * half
     for j in range(start, stop):
-        for c in range(5):
+        for c in range(FIELDS):
             _from_mixed(mixed, c, j, work)
         for i in range(stored):
             row, first = rows[i], (i * stored + j) * half
@@ -327,7 +327,7 @@ def multiply(mixed, want_speed, work, start, stop):
 @jit
 def to_points(mixed, out, work, start, stop):
     """Points in y and z, too, of fields out (m, n, n, n), in the planes from start to stop."""
-    n, lanes, points = mixed.shape[0], mixed.shape[5], work.y[0, 0]
+    n, lanes = mixed.shape[0], mixed.shape[5]
     for plane in range(start, stop):
         _to_lines(mixed, plane, out.shape[0], work)
         for group in range(-(-n // lanes)):

@@ -643,7 +643,7 @@ def test_run_that_hangs_before_its_first_step(long_case, silence):
 
 @pytest.mark.parametrize(
     "number",
-    [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.exhaustive)],
+    [pytest.param(signal.SIGINT, marks=pytest.mark.exhaustive), signal.SIGTERM],
     ids=["Ctrl-C", "SIGTERM"],
 )
 def test_run_stopped_on_request(number, long_case):

@@ -77,8 +77,7 @@ def _cut(case: Path, flow: str, slower: float, seconds: float) -> int:
     """The case ends after so many steps as take `seconds`."""
     scene = _scene(case, flow)
     whole = cost(scene, slower)
-    steps = round((scene.end_time - scene.start_time) / scene.time_step)
-    count = min(steps, max(LEAST, round(steps * seconds / (whole.solver + whole.daemon))))
+    count = min(scene.steps, max(LEAST, round(scene.steps * seconds / (whole.solver + whole.daemon))))
     _end_after(case, scene, count)
     return count
 

@@ -196,6 +196,9 @@ def _openfoam(
     fewer steps are taken than count."""
     preset = "default" if solver.application == "boxFoam" else solver.application
     original = new_case(path.with_name(f"{path.name}-case"), preset)
+    entries: dict[str, dict] = {"system/controlDict": {"functions": {}}}
+    if solver.application == "boxFoam":
+        entries["system/fvSchemes"] = {"boxSchemes": {"differences": solver.differences}}
     scene_copy(
         original,
         path,
@@ -205,12 +208,10 @@ def _openfoam(
         viscosity=flow.viscosity,
         write_every=count,
         texts={"constant/fvOptions": FORCING},
-        entries={"system/controlDict": {"functions": {}}},
+        entries=entries,
     )
     if solver.stock:
         solver.stock.write(path)
-    schemes = path / "system/fvSchemes"
-    schemes.write_text(schemes.read_text().replace("central6;", f"{solver.differences};"))
     make_mesh(path)
     (path / "0").mkdir()
     (path / "0/p").write_bytes((path / "0.orig/p").read_bytes())
