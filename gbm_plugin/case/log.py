@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 from pathlib import Path
@@ -11,9 +12,13 @@ import numpy as np
 MOST = 32 << 20  # bytes of a log, beyond which its middle is left out
 HEAD, TAIL = 64 << 10, 8 << 20  # what is kept of it
 GAP = "bytes left out by gbm run"
+EARLIER = re.compile(rb"\[\.\.\. (\d+) " + GAP.encode() + rb" \.\.\.\] *\n")
 WARNING = re.compile(
     rb"^--> FOAM Warning[^\n]*\n(?:[ \t]+[^\n]*\n)*", re.MULTILINE
 )  # with what is indented below it
+_LIBC = ctypes.CDLL(None)  # Python's os.posix_fallocate has no modes
+_LIBC.fallocate.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_long, ctypes.c_long]
+_COLLAPSE_RANGE = 0x08  # linux/falloc.h
 
 
 def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> None:
@@ -21,25 +26,40 @@ def shorten(log: Path, most: int = MOST, head: int = HEAD, tail: int = TAIL) -> 
 
     OpenFOAM's warnings stay, each kind once, as many as have room beside the head.
     """
-    if log.stat().st_size <= most:
+    size = log.stat().st_size
+    if size <= most:
         return
-    with log.open("r+b") as file:  # written in place: after truncate(0) the other process could come first
+    with log.open("r+b") as file:  # written in place: the other process keeps its own descriptor
+        block = os.fstatvfs(file.fileno()).f_frsize
+        end = (size - tail) // block * block  # of what goes, a whole number of blocks
         first = file.read(head)
         first = first[: first.rfind(b"\n") + 1]
         file.seek(len(first))
-        middle = file.read(log.stat().st_size - tail - len(first))
+        middle = file.read(end - len(first))
         warnings = b"".join(dict.fromkeys(WARNING.findall(middle)))[:head]
-        start = file.seek(-tail, os.SEEK_END)
-        last = file.read()
-        cut = last.find(b"\n") + 1
-        end = file.tell()
-        gap = f"\n[... {start + cut - len(first) - len(warnings)} {GAP} ...]\n".encode() + warnings
-        kept = first + gap + last[cut:]
-        length = os.pwrite(file.fileno(), kept, 0)
-        while newest := os.pread(file.fileno(), most, end):  # what came meanwhile
-            length += os.pwrite(file.fileno(), newest, length)
-            end += len(newest)
-        os.ftruncate(file.fileno(), length)
+        torn = file.readline(tail).rpartition(b"\n")[0]  # the rest of a line whose beginning goes
+        earlier = EARLIER.match(middle)
+        count = len(middle) + len(torn) - len(warnings)
+        if earlier:
+            count += int(earlier[1]) - len(earlier[0])
+        gap = f"[... {count} {GAP} ...]".encode()
+        whole = -(-len(first + gap + b"\n" + warnings) // block) * block
+        kept = first + gap.ljust(whole - len(first) - 1 - len(warnings)) + b"\n" + warnings
+        if len(kept) < end:
+            os.pwrite(file.fileno(), kept, 0)
+            os.pwrite(file.fileno(), b" " * len(torn), end)
+            _cut(file.fileno(), len(kept), end)
+
+
+def _cut(file: int, begin: int, end: int) -> None:
+    """Take the bytes [begin, end) out of an open file that others append to."""
+    if _LIBC.fallocate(file, _COLLAPSE_RANGE, begin, end - begin) == 0:
+        return  # at once, under the file's lock
+    # not on NFS, Lustre, tmpfs: there a line may be lost that comes between the last read and ftruncate
+    while newest := os.pread(file, 1 << 20, end):
+        begin += os.pwrite(file, newest, begin)
+        end += len(newest)
+    os.ftruncate(file, begin)
 
 
 def summary(log: Path) -> str | None:
