@@ -113,9 +113,17 @@ void Foam::fv::fiberFeedback::layOut()
 void Foam::fv::fiberFeedback::renewed(const label step)
 {
     hasBefore_ = step_ != -1 || restarted_;
-    before_.swap(force_.primitiveFieldRef());
-    filledBefore_.swap(filled_);
-    force_.correctBoundaryConditions();
+    if (!isExplicit())
+    {
+        before_.swap(force_.primitiveFieldRef());
+        filledBefore_.swap(filled_);
+    }
+    // values of processor patches are read by who takes differences of the
+    // field, those of cyclic ones by nobody
+    if (Pstream::parRun())
+    {
+        force_.correctBoundaryConditions();
+    }
     step_ = step;
 }
 
@@ -148,15 +156,15 @@ void Foam::fv::fiberFeedback::addSup(fvMatrix<vector>& eqn, const label)
 void Foam::fv::fiberFeedback::beginRate(const flowStatistics&)
 {
     const label index = mesh_.time().timeIndex();
+    if (!isExplicit())
+    {
+        layOut();
+    }
     if (step_ != index)
     {
         renew_();
     }
     used_ = index;
-    if (cells_.empty())
-    {
-        layOut();
-    }
 }
 
 
@@ -168,6 +176,10 @@ void Foam::fv::fiberFeedback::addRate(const latticeLayer& layer)
 
     for (label i = 0; i < size; ++i)
     {
+        if (!filled_[cells[i]])
+        {
+            continue;
+        }
         const vector& own = f[cells[i]];
         for (direction c = 0; c < vector::nComponents; ++c)
         {

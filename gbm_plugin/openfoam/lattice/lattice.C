@@ -220,7 +220,7 @@ void Foam::lattice::addBack
             {
                 if (added[i] != vector::zero)
                 {
-                    filled.open(sent_[rank][i], 1, cellValues);
+                    filled.mark(sent_[rank][i], 1);
                     cellValues[sent_[rank][i]] += added[i];
                 }
             }

@@ -134,11 +134,11 @@ INLINE void combine
 
 //- The N^3 cells from a slot on, as far as they are local, will be added to
 template<int N>
-__attribute__((noinline)) void open
+INLINE void mark
 (
     const lattice& cells,
     const label slot,
-    vectorField& own,
+    const label nCells,
     filledParts& filled
 )
 {
@@ -152,15 +152,15 @@ __attribute__((noinline)) void open
         const label first = slot + stride.y()*j + stride.z()*k;
         if (runs[first] >= N)
         {
-            filled.open(slots[first], N, own);
+            filled.mark(slots[first], N);
             continue;
         }
         for (int m = 0; m < N; ++m)
         {
             const label celli = slots[first + m];
-            if (celli >= 0 && celli < own.size())
+            if (celli >= 0 && celli < nCells)
             {
-                filled.open(celli, 1, own);
+                filled.mark(celli, 1);
             }
         }
     }
@@ -198,7 +198,7 @@ INLINE void spreadAll
     const UList<point>& points = beads.points();
     vector next;
     label nextSlot = points.size() ? cells.around(points[0], next) : 0;
-    label opened = -1;
+    label marked = -1;
 
     forAll(points, bead)
     {
@@ -211,10 +211,10 @@ INLINE void spreadAll
             target.template fetch<N>(nextSlot, below);
         }
 
-        if (slot != opened)
+        if (slot != marked)
         {
-            open<N>(cells, slot, field, filled);
-            opened = slot;
+            mark<N>(cells, slot, nCells, filled);
+            marked = slot;
         }
 
         double w[3][N], s[3][N];
@@ -314,7 +314,7 @@ void Foam::latticeSampler<Interpolant>::spread
     static const Interpolant interpolant = Interpolant();
 
     cells.setSize(lattice_.nCells());
-    filled.begin(cells.size());
+    filled.clear(cells);
     List<vector> neighbours(lattice_.nNeighbours(), Zero);
     spreadWith
     (
@@ -322,7 +322,6 @@ void Foam::latticeSampler<Interpolant>::spread
         neighbours.begin()
     );
     lattice_.addBack(neighbours, cells, filled);
-    filled.end(cells);
 }
 
 
