@@ -369,7 +369,6 @@ void Foam::functionObjects::fiberCoupling::receiveForces
         );
         start += 6*daemon.beads();
     }
-    t.forces += watch.lap();
 
     // the power of a bead, in the words of what was sampled; and its loads by
     // the mass of a cell, one for all: sampler refuses to spread on others
@@ -399,6 +398,9 @@ void Foam::functionObjects::fiberCoupling::receiveForces
     *feedback::exchange() = exchange/(nCells_*cellMass_);
 
     const scalarList own(beads_->distribute(std::move(loads), 6));
+    // only now, as ranks without a daemon wait for others until here
+    t.forces += watch.lap();
+
     sampler_->spread
     (
         own, beads_(), feedback_->next(), feedback_->nextFilled()

@@ -197,15 +197,29 @@ void Foam::lattice::addBack
         return;
     }
 
+    // those that hold something, mostly few, with their places
     PstreamBuffers buffers(Pstream::commsTypes::nonBlocking);
     label start = 0;
     forAll(received_, rank)
     {
         if (received_[rank])
         {
-            UOPstream to(rank, buffers);
-            to << List<vector>(SubList<vector>(values, received_[rank], start));
+            DynamicList<label> places;
+            DynamicList<vector> some;
+            for (label i = 0; i < received_[rank]; ++i)
+            {
+                const vector& value = values[start + i];
+                if (value != vector::zero)
+                {
+                    places.append(i);
+                    some.append(value);
+                }
+            }
             start += received_[rank];
+
+            UOPstream to(rank, buffers);
+            to  << static_cast<const labelUList&>(places)
+                << static_cast<const UList<vector>&>(some);
         }
     }
     buffers.finishedSends();
@@ -215,14 +229,13 @@ void Foam::lattice::addBack
         if (sent_[rank].size())
         {
             UIPstream from(rank, buffers);
+            const labelList places(from);
             const List<vector> added(from);
             forAll(added, i)
             {
-                if (added[i] != vector::zero)
-                {
-                    filled.mark(sent_[rank][i], 1);
-                    cellValues[sent_[rank][i]] += added[i];
-                }
+                const label celli = sent_[rank][places[i]];
+                filled.mark(celli, 1);
+                cellValues[celli] += added[i];
             }
         }
     }
