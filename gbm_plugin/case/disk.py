@@ -13,8 +13,8 @@ from .scene import Scene
 
 log = logging.getLogger(__name__)
 
-# numbers for each cell that OpenFOAM writes: U; U, p, phi; U_0, phi_0 of schemes that remember
-VELOCITY, NEWEST, OLDER = 3, 7, 6
+# numbers for each cell that OpenFOAM writes: U; U, p, phi; U_0, phi_0 of schemes that remember; fiberForce
+VELOCITY, NEWEST, OLDER, FORCE = 3, 7, 6, 3
 REMEMBER = ("backward", "CrankNicolson", "localEuler")
 MODES = 9  # numbers for each cell in uniform/boxFoam, in binary: of the velocity and of two earlier rates
 # bytes for each cell of a spectral run: U in binary; the modes that are kept, of it and of three slopes
@@ -67,6 +67,7 @@ def _cell_bytes(scene: Scene, control: Dictionary) -> float:
         schemes = Dictionary.read(scene.case, "system/fvSchemes")
         ddt = str(schemes.sub("ddtSchemes", {}).raw("default", ""))
         numbers += OLDER if any(name in ddt for name in REMEMBER) else 0
+    numbers += FORCE if scene.coupling.feedback else 0
     ascii = control.word("writeFormat", default="ascii") == "ascii"
     size = control.integer("writePrecision", 6) + SIGNS if ascii else BINARY
     packed = control.word("writeCompression", default="off") in ("on", "yes", "true", "compressed")

@@ -86,6 +86,8 @@ def stored(scene: Scene) -> list[Item]:
     fields = "U, p, phi,"
     if scene.application == "boxFoam" and not control.switch("writePressure", True):
         fields = "U,"
+    if scene.coupling.feedback:
+        fields += " fiberForce,"
     if scene.application == SPECTRAL:
         fields = f"{SPECTRAL}/<time>: U,"
     state = "flow and fibers" if scene.application in ("boxFoam", SPECTRAL) else "fibers"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gbm_plugin.case.check import check_openfoam
+from gbm_plugin.case.disk import needed
 from gbm_plugin.case.feedback import exchange_step
 from gbm_plugin.case.info import figures
 from gbm_plugin.case.scene import read_scene
@@ -36,6 +37,9 @@ def test_info_says_what_fibers_are_to_the_flow(tmp_path):
     nu = scene.kinematic_viscosity
     assert exchange_step(scene) == pytest.approx(6 * np.pi * nu * a * 20 * n * 0.02, rel=1e-6)
     told = " ".join(gbm("info", path).stdout.split())
+    set_entry(path / "constant/fiberProperties", "coupling { feedback", "no")
+    more = needed(scene)["time_folder"] - needed(read_scene(path))["time_folder"]
+    assert more == 24 * 16**3 and "U, p, phi, fiberForce," in told
     assert "forces and torques of the beads" in told and "6 pi nu a n dt: stable to 0.5" in told
 
 

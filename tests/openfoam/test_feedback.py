@@ -11,7 +11,7 @@ from gbm_plugin.output.field import read_velocity
 from gbm_plugin.output.recording import open_recording
 from gbm_plugin.output.tables import read_dat
 
-from conftest import divide, make_case, run_case, set_entry
+from conftest import divide, gbm, make_case, run_case, set_entry
 
 pytestmark = pytest.mark.openfoam
 
@@ -129,3 +129,34 @@ def test_a_stopped_run_continues_to_the_same_bits(whole, tmp_path):
     np.testing.assert_array_equal(
         read_velocity(other, "0.4", (16, 16, 16)), read_velocity(path, "0.4", (16, 16, 16))
     )
+
+
+FACE = """face { type surfaceFieldValue; libs (fieldFunctionObjects); fields (fiberForce); operation areaAverage;
+    regionType patch; name xLow; writeFields no; log no; }
+"""
+
+
+def test_function_objects_find_the_force_on_faces_of_the_box(tmp_path):
+    """Half of that on either side, in the mean over a face."""
+    path = coupled(tmp_path / "case", steps=2, write_every=2, cells=12)
+    control = path / "system/controlDict"
+    control.write_text(control.read_text().replace("functions\n{", "functions\n{\n" + FACE))
+    run_case(path)
+    force = read_velocity(path, "0.04", (12, 12, 12), "fiberForce")
+    last = next(path.glob("postProcessing/face/0/*.dat")).read_text().splitlines()[-1]
+    found = [float(number) for number in re.findall(r"[-+.e\d]+", last)[1:]]
+    expected = (force[:, 0] + force[:, -1]).mean(axis=(1, 2)) / 2
+    assert np.abs(expected).max() > 0
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("word", ["yes", "no"])
+def test_the_force_is_no_entry_of_ones_own(word, tmp_path):
+    """Whether it acts or not: constant/fiberProperties alone says so."""
+    path = coupled(tmp_path / "case", steps=2, write_every=2, cells=12)
+    set_entry(path / "constant/fiberProperties", "coupling { feedback", word)
+    with open(path / "constant/fvOptions", "a") as options:
+        options.write(f"mine {{ type fiberFeedback; active {'no' if word == 'yes' else 'yes'}; }}\n")
+    done = gbm("run", path)
+    assert done.returncode == 1
+    assert "fvOptions has the entry mine of type fiberFeedback: take it out" in done.stderr

@@ -96,12 +96,5 @@ def test_a_dragged_bead_finds_what_is_taken_from_it(application, word, speed, tm
     for _ in range(steps + 1):
         taken.append(own.motion[:, 0])
         own.advance(*loads, step)
-    print(
-        "RATIO",
-        application,
-        word,
-        speed,
-        [(np.array(u)[20:] * direction).sum(axis=2).mean() for u in (found, taken)],
-    )
     along = [(np.array(u)[20:] * direction).sum(axis=2).mean() for u in (found, taken)]
     assert along[1] == pytest.approx(along[0], rel=0.06)

@@ -53,6 +53,11 @@ Foam::fv::fiberFeedback::fiberFeedback
         ).typeHeaderOk<volVectorField>(true)
     ),
     used_(-1),
+    looked_
+    (
+        Pstream::parRun()
+     || mesh.time().controlDict().subOrEmptyDict("functions").size() > 1
+    ),
     firstLayer_(0)
 {
     option::read(dict);
@@ -73,7 +78,7 @@ Foam::fv::fiberFeedback& Foam::fv::fiberFeedback::addTo
     {
         if (isA<fiberFeedback>(all[i]))
         {
-            return refCast<fiberFeedback>(all[i]);
+            refCast<fiberFeedback>(all[i]).refuse();
         }
     }
 
@@ -87,6 +92,15 @@ Foam::fv::fiberFeedback& Foam::fv::fiberFeedback::addTo
 
 
 // * * * * * * * * * * * * * Private Member Functions  * * * * * * * * * * * //
+
+void Foam::fv::fiberFeedback::refuse() const
+{
+    FatalErrorInFunction
+        << "fvOptions has the entry " << name_ << " of type " << typeName
+        << ": take it out. Whether fibers act on the flow is said by the entry"
+        << " feedback of constant/fiberProperties, coupling" << exit(FatalError);
+}
+
 
 void Foam::fv::fiberFeedback::layOut()
 {
@@ -119,8 +133,8 @@ void Foam::fv::fiberFeedback::renewed(const label step)
         filledBefore_.swap(filled_);
     }
     // values of processor patches are read by who takes differences of the
-    // field, those of cyclic ones by nobody
-    if (Pstream::parRun())
+    // field, those of cyclic ones by function objects alone
+    if (looked_)
     {
         force_.correctBoundaryConditions();
     }
@@ -130,6 +144,10 @@ void Foam::fv::fiberFeedback::renewed(const label step)
 
 void Foam::fv::fiberFeedback::addSup(fvMatrix<vector>& eqn, const label)
 {
+    if (!renew_)
+    {
+        refuse();
+    }
     const label index = mesh_.time().timeIndex();
     if (step_ != index - 1)
     {
@@ -155,6 +173,10 @@ void Foam::fv::fiberFeedback::addSup(fvMatrix<vector>& eqn, const label)
 
 void Foam::fv::fiberFeedback::beginRate(const flowStatistics&)
 {
+    if (!renew_)
+    {
+        refuse();
+    }
     const label index = mesh_.time().timeIndex();
     if (!isExplicit())
     {
