@@ -28,10 +28,10 @@ TASK, TASK_TIME, REPEATS = 64, 3.6e-3, 15
 
 # a step of a flow [s]: its log and its tables, and for each cell
 STEP = 0.4e-3
-BOX_FOAM = 3.0e-9  # times log2(cells)
+BOX_FOAM = 5.4e-8  # in proportion to the cells: large transforms are better used than small ones
 OUTER, PRESSURE = 1.6e-6, 0.25e-6  # pimpleFoam, pisoFoam: an outer corrector, a pressure equation in it
-# of the spectral solver, times log2(nodes): a step; one of the fields at the nodes that are sampled
-MODES, FIELD = 1.5e-9, 0.35e-9
+# of the spectral solver: a step; one of the fields at the nodes that are sampled
+MODES, FIELD = 2.7e-8, 6.3e-9
 RUNGE_KUTTA = 6  # right-hand sides more, in the first steps of the spectral solver
 
 # velocity and rotation at a bead [s], by the interpolation
@@ -149,9 +149,9 @@ def _flow(scene: Scene, cells: int, steps: int) -> float | None:
         return None
     if scene.application == SPECTRAL:
         rates = steps * sub_cycles(scene.case) + RUNGE_KUTTA
-        return STEP * steps + MODES * cells * math.log2(cells) * rates
+        return STEP * steps + MODES * cells * rates
     if scene.application == "boxFoam":
-        return steps * (STEP + BOX_FOAM * cells * math.log2(cells))
+        return steps * (STEP + BOX_FOAM * cells)
     if scene.application not in ("pimpleFoam", "pisoFoam"):
         return None
     name = "PIMPLE" if scene.application == "pimpleFoam" else "PISO"
@@ -173,7 +173,7 @@ def _sampled(scene: Scene, cells: int, beads: int) -> float:
     if word == "exact":
         return part * beads * AT_NODES_EXACT * 4 / 27 * cells
     bead = AT_NODES.get(word, 0.0) + (missed if 8 * numbers * cells > CACHE else 0.0)
-    return numbers * FIELD * cells * math.log2(cells) + part * beads * bead
+    return numbers * FIELD * cells + part * beads * bead
 
 
 def _hidden(scene: Scene, step: float, daemon: float, sampling: float) -> tuple[float, float]:
