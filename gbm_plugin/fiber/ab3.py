@@ -134,11 +134,13 @@ def plan(ages: list[float], step: float, flow: np.ndarray) -> Plan:
 def sample_weights(times: np.ndarray, step: float, count: int) -> np.ndarray:
     """(count, STAGES, SAMPLES) weights of samples at these times, at the stages of sub-steps from time 0 on."""
     at = (np.arange(count)[:, None] + np.arange(STAGES) / STAGES) * step
+    nodes = np.arange(len(times))
+    apart = np.subtract.outer(times, times)
+    apart[nodes, nodes] = 1.0
+    factors = (at[..., None, None] - times) / apart
+    factors[..., nodes, nodes] = 1.0
     weights = np.zeros((count, STAGES, SAMPLES))
-    for j, own in enumerate(times):
-        weights[..., j] = 1.0
-        for other in (t for m, t in enumerate(times) if m != j):
-            weights[..., j] *= (at - other) / (own - other)
+    weights[..., nodes] = factors.prod(axis=-1)
     return weights
 
 

@@ -160,11 +160,16 @@ class Stepper:
         gap is its error at the end: c, and with it the integral over the step, follow. A step that was corrected is
         better than that.
         """
-        before = np.array(self._ambient.times[-1 - SAMPLES : -1])
-        if not len(before):
+        before = self._ambient.times[-1 - SAMPLES : -1]
+        if not before:
             return np.zeros(self.fibers.count)
-        error = np.poly((before - self._start) / self._length)  # in units of the step, from its start
-        share = np.polyval(np.polyint(error), 1.0) / np.polyval(error, 1.0)
+        error = [
+            1.0
+        ]  # coefficients of Π in units of the step, from its start: with numpy.poly a third of a small step
+        for time in before:
+            node = (time - self._start) / self._length
+            error = [a - node * b for a, b in zip([0.0, *error], [*error, 0.0], strict=True)]
+        share = sum(c / (power + 1) for power, c in enumerate(error)) / sum(error)
         return abs(share) * self._length * self.prediction_gap / self.fibers.contour_length
 
     def observe(self, time: float, velocity: ArrayLike, extra: ArrayLike | None) -> None:
