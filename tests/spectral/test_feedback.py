@@ -92,10 +92,12 @@ AXES = np.array([(0, 1, g) for g in (1, -1)]) * (
 )  # of an icosahedron, with their turns
 
 
-def suspension(beads, length, places):
-    """Rods along the six axes of an icosahedron (isotropic up to fourth order) at each of so many places along z."""
-    axes = np.concatenate([np.roll(AXES, turn, axis=1) for turn in range(3)])
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+ALL_AXES = np.concatenate([np.roll(AXES, turn, axis=1) for turn in range(3)])  # isotropic up to fourth order
+
+
+def suspension(beads, length, places, axes):
+    """Rods along each of the axes at each of so many places along z."""
+    axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     s = length / beads * (np.arange(beads) - (beads - 1) / 2)
     rods = s[:, None] * axes[:, None]
     shift = np.zeros((places, 1, 1, 3))
@@ -103,15 +105,16 @@ def suspension(beads, length, places):
     return (rods + shift).reshape(-1, beads, 3)
 
 
-def damping(beads, length, wave, places=5, integrator="implicit"):
-    """ν_f/ν of a weak Kolmogorov flow u_x = sin kz, from the decay of the mode in the solver with and without rods."""
+def damping(beads, length, wave, axes=ALL_AXES, integrator="implicit"):
+    """ν_f/ν of a weak Kolmogorov flow u_x = sin kz, from the decay of the mode in the solver with and without rods; the
+    same of what they make of u_y; and how many they are in a volume."""
     nu, step, decayed = 1.0, 1e-3, []
     for coupled in (False, True):
         solver = SpectralSolver(16, nu, time_step=step, interpolation="exact")
         start = np.zeros((3, 16, 16, 16))
         start[0] = np.sin(wave * nodes(16)[2])
         solver.set_velocity(start)
-        fibers = Fibers(suspension(beads, length, places), 1e4 * length**4, 1.0)
+        fibers = Fibers(suspension(beads, length, 5, axes), 1e4 * length**4, 1.0)
         stepper = Stepper(fibers, 0.0, integrator=integrator)
         for _ in range(3):
             if coupled:
@@ -120,9 +123,10 @@ def damping(beads, length, wave, places=5, integrator="implicit"):
                 r = stepper.reaction(step)
                 solver.set_point_forces(fibers.positions, r.force, r.torque)
             solver.advance(1)
-        mode = solver.coefficients[0, 0, 0, wave]
-        decayed.append(-np.log(2 * abs(mode)))
-    return decayed[1] / decayed[0] - 1, 6 * places / (2 * np.pi) ** 3
+        along, across, _ = solver.coefficients[:, 0, 0, wave]
+        decayed.append(-np.log(2 * abs(along)))
+    turned = -(across / along).real / (nu * wave**2 * solver.time)
+    return decayed[1] / decayed[0] - 1, turned, fibers.count / (2 * np.pi) ** 3
 
 
 def theory(beads, length, number_density):
@@ -137,17 +141,37 @@ def theory(beads, length, number_density):
 
 @pytest.mark.parametrize("beads", [2, 5, 20])
 def test_rods_damp_a_weak_kolmogorov_flow_as_theory_says(beads):
-    found, density = damping(beads, 0.05, 1)
+    found, turned, density = damping(beads, 0.05, 1)
     limit, chain = theory(beads, 0.05, density)
     assert found == pytest.approx(chain, rel=2e-3)
     assert found > 1.005 * limit
+    assert abs(turned) < 1e-9 * found
+
+
+@pytest.mark.parametrize("axis", [(1, 2, 3), (1, 0, 1)])
+def test_aligned_rods_damp_and_turn_it_by_their_tensor(axis):
+    """σ = n ζ [(p·E·p) pp + q ((E·p)⊥ p + p (E·p)⊥)/2], q = ζ_r/(ζ + ζ_r), ζ and ζ_r as in `theory`."""
+    beads, length = 20, 0.05
+    found, turned, density = damping(beads, length, 1, axes=np.array([axis]))
+    p = np.array(axis) / np.linalg.norm(axis)
+    strain = np.zeros((3, 3))
+    strain[0, 2] = strain[2, 0] = 0.5
+    stretched = strain @ p
+    across = stretched - (p @ stretched) * p
+    ratio = 4 / (beads**2 - 1)
+    dipole = (p @ stretched) * np.outer(p, p)
+    dipole += ratio / (1 + ratio) * (np.outer(across, p) + np.outer(p, across)) / 2
+    zeta = 2 * np.pi * (length / (2 * beads)) ** 3 * beads * (beads**2 - 1)
+    along_x, along_y, _ = density * zeta * dipole[:, 2]
+    assert found == pytest.approx(along_x, rel=3e-3)
+    assert turned == pytest.approx(along_y, rel=3e-3, abs=1e-6 * along_x)
 
 
 def test_longer_rods_damp_less():
     """(kL)² corrections lower ν_f: a rod feels the mean strain along itself. Twice the length, four times that."""
     lost = []
     for length in (0.4, 0.8):
-        found, density = damping(12, length, 2, integrator="ab3")
+        found, _, density = damping(12, length, 2, integrator="ab3")
         lost.append(1 - found / theory(12, length, density)[1])
     assert lost[0] > 0
     assert lost[1] / lost[0] == pytest.approx(4, rel=0.15)
