@@ -163,9 +163,8 @@ class Stepper:
         before = self._ambient.times[-1 - SAMPLES : -1]
         if not before:
             return np.zeros(self.fibers.count)
-        error = [
-            1.0
-        ]  # coefficients of Π in units of the step, from its start: with numpy.poly a third of a small step
+        # coefficients of Π in units of the step, from its start: by numpy.poly they take a third of a small step
+        error = [1.0]
         for time in before:
             node = (time - self._start) / self._length
             error = [a - node * b for a, b in zip([0.0, *error], [*error, 0.0], strict=True)]

@@ -101,7 +101,7 @@ def test_a_log_that_another_process_writes_is_shortened(log_folder):
     lines = [line for line in log.read_text().splitlines() if line.strip()]
     assert cuts > 1 and log.stat().st_size < 200_000
     assert lines[:3] == ["line 000000", "line 000001", "line 000002"] and lines[-1] == "line 029999"
-    gap = next(n for n, line in enumerate(lines) if GAP in line)
+    (gap,) = (n for n, line in enumerate(lines) if GAP in line)
     head, tail = ([int(line.split()[1]) for line in part] for part in (lines[:gap], lines[gap + 1 :]))
     assert len(tail) > 1000 and tail == sorted(tail)
     if not pause:

@@ -85,14 +85,9 @@ def test_bad_points_are_refused():
         solver.set_point_forces(np.zeros((1, 3)), np.full((1, 3), np.nan))
 
 
-AXES = np.array([(0, 1, g) for g in (1, -1)]) * (
-    1,
-    1,
-    (1 + 5**0.5) / 2,
-)  # of an icosahedron, with their turns
-
-
-ALL_AXES = np.concatenate([np.roll(AXES, turn, axis=1) for turn in range(3)])  # isotropic up to fourth order
+ICOSAHEDRON = np.array([(0, 1, g) for g in (1, -1)]) * (1, 1, (1 + 5**0.5) / 2)
+# its six axes: isotropic up to fourth order
+AXES = np.concatenate([np.roll(ICOSAHEDRON, turn, axis=1) for turn in range(3)])
 
 
 def suspension(beads, length, places, axes):
@@ -105,7 +100,7 @@ def suspension(beads, length, places, axes):
     return (rods + shift).reshape(-1, beads, 3)
 
 
-def damping(beads, length, wave, axes=ALL_AXES, integrator="implicit"):
+def damping(beads, length, wave, axes=AXES, integrator="implicit"):
     """ν_f/ν of a weak Kolmogorov flow u_x = sin kz, from the decay of the mode in the solver with and without rods; the
     same of what they make of u_y; and how many they are in a volume."""
     nu, step, decayed = 1.0, 1e-3, []
